@@ -58,6 +58,11 @@ def say_chance(p_hit: float) -> str:
     return "unlikely" if p_hit < possible else "likely" if p_hit >= likely else "possible"
 
 
+def say_count(n: int, what: str) -> str:
+    """Say how many there are: `1 trial`, `3 trials`."""
+    return f"{n} {what}" if n == 1 else f"{n} {what}s"
+
+
 def in_words(form: OutcomeFormat) -> bool:
     """Whether words describe outcomes: lengths in metres, at most three of them."""
     return form.outcome_dim <= len(WORDS) and set(form.units) == {"m"}

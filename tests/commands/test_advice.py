@@ -45,6 +45,9 @@ def test_before_a_goal_it_draws_what_moved_motions_can_reach(run, tmp_path):
     with Workspace.create(folder, symmetry="carried", no_box=True) as hoop:
         hoop.import_demonstrations(one, "a throw")
         model = hoop.learn().model
+    elsewhere = tmp_path / "shown" / "on monday" / "reach.png"
+    assert run("advise", folder, "--out", elsewhere)[0] == 0
+    assert elsewhere.is_file()
     status, out, _ = run("advise", folder)
     assert status == 0
     share = int(re.search(r"(\d+)% of the goals to which motions may be moved", out)[1])

@@ -41,6 +41,24 @@ def test_for_another_device_the_link_is_a_qr_code_too(folder, run, port, opened,
     assert "whoever has this link can move the arm" in out
 
 
+def has_ipv6():
+    try:
+        socket.create_server(("::1", 0), family=socket.AF_INET6).close()
+    except OSError:
+        return False
+    return True
+
+
+@pytest.mark.skipif(not has_ipv6(), reason="this computer has no IPv6")
+@pytest.mark.parametrize(("host", "own"), [("::1", "[::1]"), ("::", "127.0.0.1")])
+def test_it_listens_at_an_address_of_ipv6(folder, run, port, opened, monkeypatch, host, own):
+    monkeypatch.setattr("prior_reinforce.commands.console._own_address", lambda: "127.0.0.1")
+    status, out, err = run("console", folder, "--host", host, "--port", port)
+    assert (status, err) == (0, "")
+    assert f"http://{own}:{port}/#" in out
+    assert opened[0][1][:2] == (host, port)
+
+
 def test_the_same_link_again(folder, run, port, opened):
     assert run("console", folder, "--port", port) == run("console", folder, "--port", port)
 

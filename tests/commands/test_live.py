@@ -8,7 +8,13 @@ import pytest
 from rich.console import Console
 from rich.progress import Progress
 
-from prior_reinforce.commands.live import LiveView, drawing_progress, fit_progress, say
+from prior_reinforce.commands.live import (
+    LiveView,
+    drawing_progress,
+    fit_progress,
+    goals_reached,
+    say,
+)
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.generators.base import FitProgress
 from prior_reinforce.simulation.protocol import GoalTrials
@@ -87,6 +93,11 @@ def test_the_papers_count_is_demonstrations_plus_trials(view):
     assert "not reached in 2 trials" in said
     assert "trials by goal: 3, 2+" in said
     assert "1 of 2 goals reached, on average N = 6 + 3.0 = 9.0 trials" in said
+
+
+def test_where_no_goal_was_reached_nothing_is_counted():
+    missed = GoalTrials(GOAL, TRIALS[:2], ())
+    assert goals_reached(6, [missed, missed]) == ("0 of 2 goals reached", "")
 
 
 def test_a_fit_shows_its_loss_and_the_time_left(monkeypatch):

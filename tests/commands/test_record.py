@@ -3,12 +3,16 @@
 import re
 import time
 from contextlib import suppress
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from prior_reinforce.arm.executing.watch import State
+from prior_reinforce.arm.workspace.manifest import parse_manifest
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.commands.importing import Import
+from prior_reinforce.commands.record import _Session
 from tests.arm.executing.toy_arm import name_arm
 from tests.arm.workspace.planar import manifest
 from tests.commands.at_terminal import Typed
@@ -101,6 +105,23 @@ def test_a_person_who_holds_the_arm_says_so_at_the_terminal(folder, tmp_path):
         typed.type(f"{answer}\n")
         typed.wait_for(then)
         typed.close()
+
+
+def test_no_take_is_recorded_over_one_that_was_given_its_name(tmp_path):
+    shown = parse_manifest(manifest(), tmp_path / "workspace.toml")
+    terminal = SimpleNamespace(line=lambda question: "take-2")
+    session = _Session(shown, tmp_path, [0, 1], None, terminal, asks=False)
+    for size in (1.0, 2.0):
+        session.toggle()
+        for i in range(12):
+            session.add(State(i / 100, [size * i, 0.0], [size * i, 0.0]))
+        session.toggle()
+        if size == 1.0:
+            session.name_last()
+    assert [*session.taken] == ["take-2", "take-3"]
+    for name, size in (("take-2", 1.0), ("take-3", 2.0)):
+        with np.load(tmp_path / f"{name}.npz") as take:
+            assert take["q"][-1, 0] == 11 * size
 
 
 def test_an_arm_that_is_unplugged_keeps_what_was_recorded(run, folder, tmp_path):

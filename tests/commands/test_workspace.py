@@ -169,6 +169,24 @@ def test_new_says_where_an_arm_stands_beside_its_descriptions_origin(run, tmp_pa
     assert ("WARNING: turn turns about a place (0.50, -0.30) m" in out) == warned
 
 
+def test_where_the_person_at_the_terminal_gives_no_answer_nothing_is_made(
+    run, tmp_path, monkeypatch
+):
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    for answers in ([], ["carried"]):  # Ctrl-D at the first question, and at the second
+
+        def answer(question, left=answers):
+            if not left:
+                raise EOFError
+            return left.pop()
+
+        monkeypatch.setattr("builtins.input", answer)
+        status, _, err = run("new", tmp_path / "hoop")
+        assert status == 2
+        assert "no answer came, and nothing was made; answer, or say --symmetry" in err
+        assert not (tmp_path / "hoop").exists()
+
+
 def test_new_asks_again_after_a_slip_and_only_for_a_new_folder(run, tmp_path, monkeypatch):
     monkeypatch.setattr("sys.stdin.isatty", lambda: True)
     answers = iter(["carry", "carried", "no box"])

@@ -8,12 +8,11 @@ import pytest
 from prior_reinforce.report.summary import (
     headline,
     outcome_line,
-    say_goal,
-    say_tolerance,
     titles,
     trial_rows,
 )
 from prior_reinforce.session.trials import Stage
+from prior_reinforce.wording import say_place, say_tolerance
 from tests.report.swing_world import adaptation
 from tests.report.swing_world import told as record
 
@@ -110,12 +109,14 @@ def test_open_trials_say_what_they_wait_for(lines, seen):
 
 
 def test_goals_say_where_they_are_and_how_near_is_near_enough():
-    assert (say_goal(MISSED), say_tolerance(MISSED)) == ("92 cm ahead, 10 cm right", "1.5 cm")
+    assert say_place(MISSED.goal, MISSED.format) == "92 cm ahead, 10 cm right"
+    assert say_tolerance(MISSED.format) == "1.5 cm"
     mixed = adaptation(seed=1, units=("m", "s"), most=1)
-    assert say_goal(mixed) == "distance 0.9 m, duration 0.1 s"
-    assert say_tolerance(mixed) == "1.5 cm and 15 ms"
-    assert say_tolerance(replace(mixed, tolerance=[0.01, 0.2])) == "1 cm and 200 ms"
-    assert say_tolerance(replace(MISSED, tolerance=[0.0125, 0.02])) == "x 1.25 cm and y 2 cm"
+    assert say_place(mixed.goal, mixed.format) == "distance 0.9 m, duration 0.1 s"
+    assert say_tolerance(mixed.format) == "1.5 cm and 15 ms"
+    assert say_tolerance(replace(mixed, tolerance=[0.01, 0.2]).format) == "1 cm and 200 ms"
+    coarse = replace(MISSED, tolerance=[0.0125, 0.02])
+    assert say_tolerance(coarse.format) == "x 1.25 cm and y 2 cm"
     assert trial_rows(mixed)[0].aim == "distance 0.9 m, duration 0.1 s"
     named = [MISSED, replace(MISSED, title="the far hoop"), replace(MISSED, number=7)]
     assert titles(named) == ["Goal 1", "the far hoop", "Goal 7"]

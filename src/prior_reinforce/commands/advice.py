@@ -135,7 +135,6 @@ class Advise(OnWorkspace):
 
             assert workspace.state.training is not None
             out = self.out or reach_picture(workspace.folder, workspace.state.training.model)
-            out.parent.mkdir(exist_ok=True)
             shown = workspace.demonstrations.outcomes_seen
             print(f"picture: {draw_advice(out, None, None, shown, None, None, None, form, region)}")
         print_next(workspace)

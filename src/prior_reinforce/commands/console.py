@@ -90,8 +90,10 @@ class Console(OnWorkspace):
     def _listening(self) -> socket.socket:
         if not 0 <= self.port < 2**16:
             raise ConfigurationError(f"cannot listen at port {self.port}; give one up to 65535")
+        family = socket.AF_INET6 if ":" in self.host else socket.AF_INET
+        both = self.host == "::" and socket.has_dualstack_ipv6()
         try:
-            return socket.create_server((self.host, self.port))
+            return socket.create_server((self.host, self.port), family=family, dualstack_ipv6=both)
         except OSError as error:
             raise ConfigurationError(
                 f"cannot listen at {self.host}:{self.port} ({error}); give another --host or --port"
@@ -101,7 +103,8 @@ class Console(OnWorkspace):
         """Show the link, and as a QR code where another device is to open it."""
         host = _own_address() if self.host in ("0.0.0.0", "::") else self.host
         scheme = "http" if self.certificate is None else "https"
-        link = f"{scheme}://{host}:{self.port}/#{token}"
+        named = f"[{host}]" if ":" in host else host
+        link = f"{scheme}://{named}:{self.port}/#{token}"
         print(f"console of {folder}: {link}", flush=True)
         if not _is_loopback(host):
             import segno

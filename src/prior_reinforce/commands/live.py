@@ -20,7 +20,7 @@ from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.parsing import from_words
 from prior_reinforce.readings import Reading
 from prior_reinforce.terminal import plain
-from prior_reinforce.wording import error_example, say_chance, say_place, to_words
+from prior_reinforce.wording import error_example, say_chance, say_count, say_place, to_words
 
 if TYPE_CHECKING:
     from prior_reinforce.environment import Rollout
@@ -69,24 +69,25 @@ class LiveView:
         if (n := result.solved_at) is None:
             self._say("  ", ("not reached", "bold red"), f" in {len(result.trials)} trials")
         else:
-            trials = f"{n} trial{'s' if n > 1 else ''}"
-            shown = f"{self._n} demonstration{'s' if self._n > 1 else ''}"
+            shown, trials = say_count(self._n, "demonstration"), say_count(n, "trial")
             self._say(f"  reached: N = {shown} + {trials} = {self._n + n}")
 
     def summary(self, results: Sequence[GoalTrials]) -> None:
         """Print the count over all goals."""
-        if len(results) < 2 or all(result.solved_at is None for result in results):
-            return
         reached, count = goals_reached(self._n, results)
+        if len(results) < 2 or not count:
+            return
         self._say((f"\n{reached}", "bold"), f", on average {count}")
         self._say(f"trials by goal: {trials_by_goal(results)}")
 
 
 def goals_reached(n: int, results: Sequence[GoalTrials]) -> tuple[str, str]:
-    """Say how many goals were reached, and the mean count N of these, with n demonstrations."""
+    """Say how many goals were reached, and if any, their mean count N, with n demonstrations."""
     solved = [result.solved_at for result in results if result.solved_at is not None]
-    mean = float(np.mean(solved)) if solved else np.nan
-    reached = f"{len(solved)} of {len(results)} goal{'s' if len(results) > 1 else ''} reached"
+    reached = f"{len(solved)} of {say_count(len(results), 'goal')} reached"
+    if not solved:
+        return reached, ""
+    mean = float(np.mean(solved))
     return reached, f"N = {n} + {mean:.1f} = {n + mean:.1f} trials"
 
 

@@ -22,9 +22,6 @@ from prior_reinforce.readings import Reading
 from prior_reinforce.session.trials import Goal
 from prior_reinforce.wording import error_example
 
-Result = tuple[Reading | Point | None, bool | None]
-"""What was seen of a trial, and whether it hit, as `Session.tell` takes them."""
-
 
 @dataclass(frozen=True)
 class Seen(OnWorkspace):
@@ -47,8 +44,10 @@ class Seen(OnWorkspace):
 
     takes_words = True
 
-    def read(self, workspace: Workspace, words: tuple[str, ...]) -> tuple[int, Result]:
-        """Return the trial's number and what was seen of it."""
+    def read(
+        self, workspace: Workspace, words: tuple[str, ...]
+    ) -> tuple[int, Reading | Point | None, bool | None]:
+        """Return the trial's number, what was seen and whether it hit, as for `Session.tell`."""
         number, seen = trial_and_rest(workspace, words)
         given = [bool(seen), self.error is not None, self.outcome is not None]
         said = any(given) or self.hit or self.miss
@@ -60,10 +59,10 @@ class Seen(OnWorkspace):
         hit = True if self.hit else False if self.miss else None
         goal = workspace.state.goal_of(workspace.state.trial(number))
         if self.outcome is not None:
-            return number, (read_landed(" ".join(self.outcome), goal), hit)
+            return number, read_landed(" ".join(self.outcome), goal), hit
         said_words = seen or self.error
         error = None if said_words is None else read_seen(" ".join(said_words), goal)
-        return number, (error, hit)
+        return number, error, hit
 
 
 def read_seen(text: str, goal: Goal) -> Reading | Point:

@@ -7,6 +7,7 @@ import select
 import sys
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
 from typing import Any, Literal
 
@@ -51,11 +52,6 @@ _QUESTIONS: dict[Guiding, tuple[str, str]] = {
     ),
 }
 """What a person is asked before an arm is guided, and what to type for it."""
-_READING: dict[Guiding, str] = {
-    "as it is": "reading {}; move it by hand now",
-    "let go": "reading {}; move it by hand now",
-    "led": "reading {}; it follows its leader now",
-}
 _KEYS = "space or enter starts and ends a take, d drops the last, n names it, q imports them"
 
 
@@ -113,7 +109,8 @@ class Record(OnWorkspace):
             folder = _new_folder(workspace.folder / RECORDINGS)
             asks = self.takes is None
             session = _Session(manifest, folder, channels, self.motion, terminal, asks)
-            print(_READING[guiding].format(watch.arm.model), flush=True)
+            then = "it follows its leader" if guiding == "led" else "move it by hand"
+            print(f"reading {watch.arm.model}; {then} now", flush=True)
             if asks:
                 _by_keys(watch, session)
             else:
@@ -191,8 +188,9 @@ class _Session:
 
     @property
     def next_name(self) -> str:
-        """Of the next take."""
-        return f"take-{self.number + 1}"
+        """Of the next take; one that another was given is passed over."""
+        names = (f"take-{number}" for number in count(self.number + 1))
+        return next(name for name in names if name not in self.taken)
 
     def add(self, state: State) -> None:
         """One more state, of a take if there is one."""

@@ -28,7 +28,6 @@ from prior_reinforce.environment import Task
 from prior_reinforce.errors import ConfigurationError, InvalidGoalError
 from prior_reinforce.files import claim_folder
 from prior_reinforce.generators import make_generator
-from prior_reinforce.generators.base import Generator
 from prior_reinforce.perception import PERCEPTIONS, make_perception
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.vlm_client import without_secrets
@@ -44,7 +43,7 @@ from prior_reinforce.simulation.protocol import (
     unseen_goals,
 )
 from prior_reinforce.simulation.tasks import TASKS, make_task
-from prior_reinforce.wording import say_tolerance
+from prior_reinforce.wording import say_count, say_tolerance
 
 SEEN = "seen"
 """Folder beside the report for what a camera or a model saw and said."""
@@ -83,17 +82,6 @@ class OnTask:
         return task, loaded
 
 
-def learn(
-    demonstrations: Demonstrations, folder: Path, generator: Generator, seed: int, console: Console
-) -> Generator:
-    """Fit a generator under a progress line, say what it could not learn, and save it."""
-    with fit_progress(console) as progress:
-        generator = generator.fit(demonstrations, seed=seed, progress=progress)
-    say(console, f"learned: {'; '.join(generator.remarks) or 'in closed form'}")
-    save_learned(folder, generator, demonstrations, seed)
-    return generator
-
-
 @dataclass(frozen=True)
 class _Reaching:
     """How goals are reached."""
@@ -120,8 +108,8 @@ class Reached:
 
     def __str__(self) -> str:
         """The count, for a person."""
-        reached, count = goals_reached(self.records[0].demonstrations.n, self.results)
-        return f"{reached}, {count}"
+        said = goals_reached(self.records[0].demonstrations.n, self.results)
+        return ", ".join(filter(None, said))
 
     def write(self, note: str = "") -> int:
         """Write the report; exit status 1 if a goal was not reached."""
@@ -180,7 +168,7 @@ class Adapt(_Reaching, OnTask):
         """
         console = Console()
         # Made first, so that a wrong setting is reported before anything is learned.
-        adapter, unfitted = make_adapter(self.adapter), make_generator(self.generator)
+        adapter, generator = make_adapter(self.adapter), make_generator(self.generator)
         model = model_of(self.vlm)
         with make_perception(
             self.perception, scene=task.scene, config=model, seed=self.seed
@@ -189,8 +177,10 @@ class Adapt(_Reaching, OnTask):
             if perceive:
                 demonstrations = self._perceive(task, demonstrations, perception, console)
             if self.model is None:
-                folder = self.out / "model"
-                generator = learn(demonstrations, folder, unfitted, self.seed, console)
+                with fit_progress(console) as progress:
+                    generator = generator.fit(demonstrations, seed=self.seed, progress=progress)
+                say(console, f"learned: {'; '.join(generator.remarks) or 'in closed form'}")
+                save_learned(self.out / "model", generator, demonstrations, self.seed)
             else:
                 generator = load_learned(self.model, demonstrations)
             session = Session(generator, adapter, demonstrations)
@@ -211,14 +201,14 @@ class Adapt(_Reaching, OnTask):
             "Earlier goals' trials used": "yes" if session.goals[-1].carry_over else "no",
             "Version": prior_reinforce.__version__,
         }
-        title = f"{task.name}: {len(goals)} new goal" + "s" * (len(goals) > 1)
+        title = f"{task.name}: {say_count(len(goals), 'new goal')}"
         return Reached(self.out, results, records, title, facts, task.region)
 
     def _perceive(
         self, task: Task, recorded: Demonstrations, perception: Perception, console: Console
     ) -> Demonstrations:
         """Execute the demonstrations once, see where they go, and keep that for `adapt`."""
-        shown = "1 demonstration" if recorded.n == 1 else f"{recorded.n} demonstrations"
+        shown = say_count(recorded.n, "demonstration")
         say(console, f"executing {shown} once, seen by {self.perception}")
         eyes = recording(perception, self.out / SEEN, "demonstration")
         ask = asking(console, recorded, eyes)

@@ -33,7 +33,7 @@ class Tell(Seen):
     """
 
     def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
-        number, (seen, hit) = self.read(workspace, words)
+        number, seen, hit = self.read(workspace, words)
         _warn_of_its_execution(workspace.standing, number)
         trial = workspace.session().tell(number, seen, hit=hit)
         now = workspace.standing
@@ -50,7 +50,7 @@ class Amend(Seen):
     """
 
     def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
-        number, (seen, hit) = self.read(workspace, words)
+        number, seen, hit = self.read(workspace, words)
         trial = workspace.session().amend(number, seen, hit=hit)
         now = workspace.standing
         print(f"trial {trial.number}, corrected: {_say_told(now, trial, self.error or words)}")

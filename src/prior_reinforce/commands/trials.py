@@ -14,6 +14,7 @@ from msgspec import to_builtins
 
 from prior_reinforce.arm.executing.base import ArmSettings, Motion
 from prior_reinforce.arm.executing.lock import last_stop
+from prior_reinforce.arm.executing.result import MotionResult
 from prior_reinforce.arm.robots.plan_files import check_plan_path
 from prior_reinforce.arm.workspace.execute import (
     FULL_SPEED,
@@ -26,7 +27,6 @@ from prior_reinforce.arm.workspace.execute import (
     say_look,
     to_execute,
 )
-from prior_reinforce.arm.workspace.state import Standing
 from prior_reinforce.arm.workspace.text import (
     execution_warning,
     next_step,
@@ -139,8 +139,8 @@ class Ask(OnWorkspace):
         recovered = recover(workspace)
         if recovered is not None:
             print(f"trial {recovered.number}: {say_trial(workspace.standing, recovered)}")
-        did_not_move = self.arm_did_not_move
-        if not did_not_move and sys.stdin.isatty() and (cut := _cut_off(now)) is not None:
+        did_not_move, cut = self.arm_did_not_move, now.executing
+        if cut is not None and not did_not_move and sys.stdin.isatty() and not now.moving:
             print(f"trial {cut.number}: {say_trial(now, cut)}")
             if _ask_whether_it_moved():
                 print_next(workspace)
@@ -157,12 +157,9 @@ class Ask(OnWorkspace):
             print("it was executed already")
         elif self.execute:
             return self._on_arm(workspace, trial, stop_seen)
+        elif self.run_command is not None and not self.check:
+            return self._move(workspace, trial, self.run_command, stop_seen)
         else:
-            command = None if self.check else self.run_command
-            if command is not None and not self._may_move(workspace, trial):
-                return 1
-            if command is not None:
-                return self._execute(workspace, trial.number, command, stop_seen)
             wait = "execute it, then say where the object went:"
             print("checked; nothing moved" if self.check else wait)
         print_next(workspace)
@@ -193,32 +190,42 @@ class Ask(OnWorkspace):
         motions.append("trial" if self.rehearse is None else "rehearsal")
         for motion in motions:
             share = speed if motion == "rehearsal" else 1.0
-            if not self._may_move(workspace, trial, look, motion, share):
-                return 1
-            status = self._execute(workspace, trial.number, arm, stop_seen, motion, share)
+            status = self._move(workspace, trial, arm, stop_seen, look, motion, share)
             if status != 0:
                 break
         return status
 
-    def _may_move(
+    def _move(
         self,
         workspace: Workspace,
         trial: Trial,
+        by: str | ArmSettings,
+        stop_seen: int,
         look: Look | None = None,
         motion: Motion = "trial",
         speed: float = 1.0,
-    ) -> bool:
-        """Whether a person says that the arm may move now."""
+    ) -> int:
+        """Make a motion, if a person says that the arm may move now."""
         question = ask_to_move(workspace, trial, look, motion, speed)
         stop = "Ctrl-C stops the command" if look is None else "Ctrl-C stops the arm"
         question = f"{question} {stop}; keep the arm's own stop button in your hand."
         word = "rehearse" if motion == "rehearsal" else "throw"
         answer = f"{word} {trial.number}" if is_fast(motion, speed) else "yes"
         shown = question.replace(FULL_SPEED, coloured(FULL_SPEED, RED, sys.stdin))
-        if self.yes or agrees(shown, answer):
-            return True
-        print("nothing moved; run ask again when the area is clear")
-        return False
+        if not (self.yes or agrees(shown, answer)):
+            print("nothing moved; run ask again when the area is clear")
+            return 1
+        result = execute(
+            workspace,
+            trial.number,
+            by,
+            time_limit=self.time_limit,
+            motion=motion,
+            speed=speed,
+            show=lambda text: print(text, end="", flush=True),
+            stop_seen=stop_seen,
+        )
+        return _say_ended(workspace, trial.number, motion, result)
 
     def _check_flags(self) -> None:
         """Say what cannot be before anything is changed."""
@@ -294,55 +301,39 @@ class Ask(OnWorkspace):
                 + ("" if "{trial}" in str(self.out) else hint)
             )
 
-    def _execute(
-        self,
-        workspace: Workspace,
-        number: int,
-        command: str | ArmSettings,
-        stop_seen: int,
-        motion: Motion = "trial",
-        speed: float = 1.0,
-    ) -> int:
-        result = execute(
-            workspace,
-            number,
-            command,
-            time_limit=self.time_limit,
-            motion=motion,
-            speed=speed,
-            show=lambda text: print(text, end="", flush=True),
-            stop_seen=stop_seen,
-        )
-        if result.output_tail and not result.output_tail.endswith("\n"):
-            print()
-        for unit, most in result.tracking_max.items():
-            print(f"measured: at most {most:.3g} {unit} off the plan")
-        why = f": {result.reason}" if result.reason else ""
-        if result.outcome == "not_moved":
-            said = f"the arm did not move{why}; trial {number} may be executed again"
-        elif result.outcome == "unknown":
-            said = f"trial {number}{why}; nobody knows what moved: look, then ask again"
-        elif motion != "trial":
-            if result.succeeded:
-                return 0
-            said = f"the {motion} was aborted{why}; trial {number} was not executed"
-        else:
-            now = workspace.standing
-            trial = now.state.trial(number)
-            said = f"trial {number}: {say_trial(now, trial)}"
-            if result.outcome == "aborted":
-                said += f"; if the object flew all the same, tell trial {number}"
-            elif not execution_warning(now, trial):
-                print_next(workspace)
-                return 0
-        complain(said)
-        aborted = result.outcome == "aborted" and motion == "trial"
-        if aborted and sys.stdin.isatty() and agrees(f"void trial {number}?"):
-            workspace.session().void(number, result.reason)
-            print(f"trial {number} is void; nothing is learned from it")
-        if result.outcome != "unknown":
+
+def _say_ended(workspace: Workspace, number: int, motion: Motion, result: MotionResult) -> int:
+    """Say what became of a motion for a trial, and what comes next; the exit status."""
+    if result.output_tail and not result.output_tail.endswith("\n"):
+        print()
+    for unit, most in result.tracking_max.items():
+        print(f"measured: at most {most:.3g} {unit} off the plan")
+    why = f": {result.reason}" if result.reason else ""
+    if result.outcome == "not_moved":
+        said = f"the arm did not move{why}; trial {number} may be executed again"
+    elif result.outcome == "unknown":
+        said = f"trial {number}{why}; nobody knows what moved: look, then ask again"
+    elif motion != "trial":
+        if result.succeeded:
+            return 0
+        said = f"the {motion} was aborted{why}; trial {number} was not executed"
+    else:
+        now = workspace.standing
+        trial = now.state.trial(number)
+        said = f"trial {number}: {say_trial(now, trial)}"
+        if result.outcome == "aborted":
+            said += f"; if the object flew all the same, tell trial {number}"
+        elif not execution_warning(now, trial):
             print_next(workspace)
-        return 0 if result.succeeded else 1
+            return 0
+    complain(said)
+    aborted = result.outcome == "aborted" and motion == "trial"
+    if aborted and sys.stdin.isatty() and agrees(f"void trial {number}?"):
+        workspace.session().void(number, result.reason)
+        print(f"trial {number} is void; nothing is learned from it")
+    if result.outcome != "unknown":
+        print_next(workspace)
+    return 0 if result.succeeded else 1
 
 
 @dataclass(frozen=True)
@@ -368,14 +359,6 @@ class Export(OnWorkspace):
             raise ConfigurationError("say the file to write after the trial: .npz, .csv or .json")
         written = workspace.export(number, check_path(Path(rest[0])), rate=self.rate)
         print(f"written: {written.path}  sha256 {written.sha256}")
-
-
-def _cut_off(now: Standing) -> Trial | None:
-    """The trial that was executing when the program stopped, if any."""
-    trial = now.state.open_trial
-    if trial is None or now.state.stage(trial) != "executing" or now.moving:
-        return None
-    return trial
 
 
 def _ask_whether_it_moved() -> bool:

@@ -61,7 +61,12 @@ class New(NewWorkspace):
         """Write the folder."""
         with named_disk_errors(self.folder):
             require_new(self.folder)  # before anything is asked
-        asked = self._with_flange()._asked()
+        try:
+            asked = self._with_flange()._asked()
+        except EOFError as error:
+            raise ConfigurationError(
+                "no answer came, and nothing was made; answer, or say --symmetry, --box and --tip"
+            ) from error
         text = asked.manifest(self.folder.resolve().name)
         with Workspace.create(self.folder, text) as workspace:
             print(f"workspace made in {self.folder}; look through {self.folder / 'workspace.toml'}")

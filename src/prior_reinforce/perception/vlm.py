@@ -25,7 +25,7 @@ from prior_reinforce.perception.vlm_client import (
     OpenAIClient,
     VisionLanguageModelConfig,
 )
-from prior_reinforce.perception.vlm_formats import FORMATS, Box, Family, UnreadableAnswerError
+from prior_reinforce.perception.vlm_formats import FORMATS, Box, UnreadableAnswerError
 from prior_reinforce.perception.vlm_reading import Answer, PictureReading, Sighting
 from prior_reinforce.readings import Reading
 
@@ -207,8 +207,7 @@ class VisionLanguageModel(Perception):
             except EndpointError as error:
                 problem = f"looking for {words}: {error}"
                 return Sighting(words, tuple(answers), problem=problem, unanswered=True)
-            answer = _with_box(answer, self.config.family, picture, sent)
-            answers.append(_of_right_size(answer, wanted.size, calibration))
+            answers.append(self._judged(answer, wanted, picture, sent))
             boxes = [answer.box for answer in answers if answer.box is not None]
             absent = sum(answer.absent for answer in answers)
             if len(boxes) + absent >= votes and absent > len(boxes):
@@ -226,6 +225,38 @@ class VisionLanguageModel(Perception):
             why = f"only {len(boxes)} of {len(answers)} answers hold a box (last: {last})"
         return Sighting(words, tuple(answers), problem=f"{words}: {why}")
 
+    def _judged(
+        self, answer: Answer, wanted: SeenObject, picture: Picture, sent: Picture
+    ) -> Answer:
+        """The answer with its box, in pixels of the picture as taken, or with why there is none.
+
+        One that cannot be around an object of this size is none.
+        """
+        height, width, _ = sent.shape
+        try:
+            if answer.finish_reason == "length":
+                raise UnreadableAnswerError("cut off at max_tokens")
+            if answer.finish_reason == "content_filter":
+                raise UnreadableAnswerError("stopped by the server's content filter")
+            if not answer.text.strip() and answer.thinking:
+                raise UnreadableAnswerError(
+                    "the answer is empty, all of it is in the thoughts; serve the model without a "
+                    "reasoning parser, or raise max_tokens"
+                )
+            box = vlm_formats.read_box(answer.text, FORMATS[self.config.family], (width, height))
+            per_x, per_y = picture.shape[1] / width, picture.shape[0] / height
+            left, top, right, bottom = np.multiply(box, (per_x, per_y, per_x, per_y)).tolist()
+            corners = self._in(picture).to_table([[left, top], [right, top], [left, bottom]])
+            side = np.linalg.norm(corners[1:] - corners[0], axis=1).max()
+            if not wanted.size / 2 <= side <= 2 * wanted.size:
+                raise UnreadableAnswerError(
+                    f"a box of {100 * side:.1f} cm for an object of {100 * wanted.size:.1f} cm"
+                )
+        except UnreadableAnswerError as error:
+            absent = isinstance(error, vlm_formats.NotInPictureError)
+            return replace(answer, problem=str(error), absent=absent)
+        return replace(answer, box=(left, top, right, bottom))
+
 
 def _shrunk(picture: Picture, config: VisionLanguageModelConfig) -> Picture:
     """The picture in a size that a server will leave as it is."""
@@ -236,39 +267,6 @@ def _shrunk(picture: Picture, config: VisionLanguageModelConfig) -> Picture:
     if sent == image.size:
         return picture
     return np.asarray(image.resize(sent, Image.Resampling.LANCZOS))
-
-
-def _with_box(answer: Answer, family: Family, picture: Picture, sent: Picture) -> Answer:
-    """The answer with its box, in pixels of the picture as taken, or with why there is none."""
-    height, width, _ = sent.shape
-    try:
-        if answer.finish_reason == "length":
-            raise UnreadableAnswerError("cut off at max_tokens")
-        if answer.finish_reason == "content_filter":
-            raise UnreadableAnswerError("stopped by the server's content filter")
-        if not answer.text.strip() and answer.thinking:
-            raise UnreadableAnswerError(
-                "the answer is empty, all of it is in the thoughts; serve the model without a "
-                "reasoning parser, or raise max_tokens"
-            )
-        box = vlm_formats.read_box(answer.text, FORMATS[family], (width, height))
-    except UnreadableAnswerError as error:
-        absent = isinstance(error, vlm_formats.NotInPictureError)
-        return replace(answer, problem=str(error), absent=absent)
-    left, top, right, bottom = box
-    per_x, per_y = picture.shape[1] / width, picture.shape[0] / height
-    return replace(answer, box=(left * per_x, top * per_y, right * per_x, bottom * per_y))
-
-
-def _of_right_size(answer: Answer, size: float, calibration: TableCalibration) -> Answer:
-    """The answer, without its box where that cannot be around an object of this size [m]."""
-    if answer.box is None:
-        return answer
-    side = max(_sides(answer.box, calibration))
-    if size / 2 <= side <= 2 * size:
-        return answer
-    problem = f"a box of {100 * side:.1f} cm for an object of {100 * size:.1f} cm"
-    return replace(answer, box=None, problem=problem)
 
 
 def _against(box: Box, calibration: TableCalibration, size: float) -> tuple[float, float, float]:
@@ -285,14 +283,6 @@ def _against(box: Box, calibration: TableCalibration, size: float) -> tuple[floa
 
 def _alike(one: float, other: float) -> bool:
     return max(one / other, other / one) < _ALIKE
-
-
-def _sides(box: Box, calibration: TableCalibration) -> tuple[float, float]:
-    """Width and height of a box in the picture, on the table, in [m]."""
-    left, top, right, bottom = box
-    corners = calibration.to_table(np.array([[left, top], [right, top], [left, bottom]]))
-    wide, tall = np.linalg.norm(corners[1:] - corners[0], axis=1).tolist()
-    return wide, tall
 
 
 def _centres(boxes: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n 2"]:

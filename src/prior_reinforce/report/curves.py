@@ -27,8 +27,9 @@ from prior_reinforce.report.style import (
     new_figure,
     trial_colour,
 )
-from prior_reinforce.report.summary import CALLED, numbers, say_distance, say_tolerance
+from prior_reinforce.report.summary import CALLED, numbers, say_distance
 from prior_reinforce.session.trials import Stage, Trial
+from prior_reinforce.wording import say_tolerance
 
 _COLUMNS = 4
 _LEAST_TRIALS = 3  # that the error's axis has room for
@@ -115,7 +116,7 @@ def draw_errors(record: AdaptationRecord) -> Figure:
         axes.plot(list(true), list(true.values()), "o", **hollow, zorder=4, label="true error")
         axes.legend(frameon=False, fontsize=9, labelcolor=INK_SOFT, loc="upper right")
     room = max(n, _LEAST_TRIALS)
-    reached = f"shaded: reached, within {say_tolerance(record)}"
+    reached = f"shaded: reached, within {say_tolerance(record.format)}"
     axes.set_title(reached, loc="right", fontsize=9.5, color=GOAL)
     axes.set_ylim(0, 1.18 * max([2.5 * tolerance, *seen.values(), *true.values()]))
     axes.set_xlim(0.5, room + 0.7)

@@ -21,7 +21,7 @@ from prior_reinforce.files import sha256, write
 from prior_reinforce.report import summary
 from prior_reinforce.report.html import data_uri, render
 from prior_reinforce.report.record import AdaptationRecord, Box
-from prior_reinforce.wording import in_words
+from prior_reinforce.wording import in_words, say_place, say_tolerance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -159,8 +159,8 @@ def _section(
         "record": record,
         "anchor": stem,
         "title": title,
-        "place": summary.say_goal(record),
-        "tolerance": summary.say_tolerance(record),
+        "place": say_place(record.goal, record.format),
+        "tolerance": say_tolerance(record.format),
         "outcome": summary.outcome_line(record),
         "rows": summary.trial_rows(record),
         "colours": [trial_colour(i, n, hit=trial.hit) for i, trial in enumerate(record.trials)],

@@ -15,8 +15,8 @@ from prior_reinforce.arrays import Point, Points
 from prior_reinforce.report import style
 from prior_reinforce.report.panels import Panel, views_of
 from prior_reinforce.report.record import AdaptationRecord, Box
-from prior_reinforce.report.summary import say_tolerance
 from prior_reinforce.session.trials import Stage
+from prior_reinforce.wording import say_tolerance
 
 _WIDTH, _HEIGHT = 5.4, 4.5  # [inch], one of two beside each other on a page
 _LABELS = (0.7, 0.72)  # [inch], what labels take of a panel's width and height
@@ -137,7 +137,7 @@ def _legend(record: AdaptationRecord, *, aims: bool = False) -> dict[str, Any]:
     """Marks by what they mean; a tuple of marks stands side by side."""
     tried, marker = ("aims", "s") if aims else ("misses", "o")
     legend: dict[str, Any] = {
-        f"goal ± {say_tolerance(record)}": _mark(style.GOAL, markerfacecolor="none"),
+        f"goal ± {say_tolerance(record.format)}": _mark(style.GOAL, markerfacecolor="none"),
         "demonstrations": _mark(style.DEMONSTRATION, "D"),
         f"{tried}, first to last": tuple(_mark(style.trial_colour(i, 3), marker) for i in range(3)),
     }

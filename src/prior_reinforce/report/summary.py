@@ -10,7 +10,14 @@ import numpy as np
 from prior_reinforce import wording
 from prior_reinforce.report.record import AdaptationRecord
 from prior_reinforce.session.trials import Stage, Trial
-from prior_reinforce.wording import error_words, in_words, say_place, say_reading, to_words
+from prior_reinforce.wording import (
+    error_words,
+    in_words,
+    say_count,
+    say_place,
+    say_reading,
+    to_words,
+)
 
 CALLED = "called "
 """Before the distance of a hit that was told to lie farther off than the tolerance."""
@@ -67,21 +74,21 @@ def headline(records: Sequence[AdaptationRecord]) -> Headline:
     if several and not tried:
         text = "No goal tried yet"
     elif several:
-        text = f"{len(counts)} of {_count(len(tried), 'goal')} reached"
-    tolerances = dict.fromkeys(say_tolerance(record) for record in records)
+        text = f"{len(counts)} of {say_count(len(tried), 'goal')} reached"
+    tolerances = dict.fromkeys(wording.say_tolerance(record.format) for record in records)
     within = f"A goal counts as reached within {' or '.join(tolerances)}."
     named = zip(titles(records), records, strict=True)
     untried = [title for title, record in named if not record.told]
     if several and untried:
         within += f" Left out, with no trial that counts: {', '.join(untried)}."
     if not counts:
-        so_far = _count(sum(len(record.told) for record in records), "trial")
+        so_far = say_count(sum(len(record.told) for record in records), "trial")
         return Headline(text, "", f"{so_far} so far. {within}")
     demonstrated = {record.demonstrations.n for record in records}
     if len(demonstrated) > 1:
         return Headline(text, "", within)
     n, mean = demonstrated.pop(), float(np.mean(counts))
-    least, most = _count(min(counts), "trial"), max(counts)
+    least, most = say_count(min(counts), "trial"), max(counts)
     if not several:
         spent = f"{least} on the arm to reach the goal"
     elif len(counts) == 1:
@@ -96,7 +103,7 @@ def headline(records: Sequence[AdaptationRecord]) -> Headline:
         goals = "goal that was" if missing == 1 else "goals that were"
         left_out = f" This leaves out the {missing} {goals} not reached."
     count = f"N = {n} + {mean:.1f} trials" if several else f"N = {n} + {most} trials"
-    explanation = f"{_count(n, 'demonstration')}, then {spent}.{left_out} {within}"
+    explanation = f"{say_count(n, 'demonstration')}, then {spent}.{left_out} {within}"
     return Headline(text, count, explanation, complete=not missing)
 
 
@@ -115,9 +122,9 @@ def outcome_line(record: AdaptationRecord) -> str:
     """Say in one line how it went for one goal."""
     count = record.trials_to_hit
     if count is not None:
-        return f"reached in {_count(count, 'trial')}"
+        return f"reached in {say_count(count, 'trial')}"
     if record.told:
-        return f"not reached in {_count(len(record.told), 'trial')}"
+        return f"not reached in {say_count(len(record.told), 'trial')}"
     waiting = [trial for trial in record.trials if trial.open]
     if waiting:
         number = waiting[-1].number
@@ -128,16 +135,6 @@ def outcome_line(record: AdaptationRecord) -> str:
 def trial_rows(record: AdaptationRecord) -> list[TrialRow]:
     """Say each trial of a goal in words."""
     return [_row(record, i, trial) for i, trial in enumerate(record.trials)]
-
-
-def say_goal(record: AdaptationRecord) -> str:
-    """Say where the goal is."""
-    return say_place(record.goal, record.format)
-
-
-def say_tolerance(record: AdaptationRecord) -> str:
-    """Say how near counts as reached."""
-    return wording.say_tolerance(record.format)
 
 
 def say_distance(record: AdaptationRecord, distance: float) -> str:
@@ -180,7 +177,3 @@ def _row(record: AdaptationRecord, i: int, trial: Trial) -> TrialRow:
 def explain_words(record: AdaptationRecord) -> str:
     """Say what the words of an error mean, of those that these outcomes have."""
     return "; ".join(_MEANS[pair[0]] for pair in error_words(record.format) if pair)
-
-
-def _count(n: int, what: str) -> str:
-    return f"{n} {what}" if n == 1 else f"{n} {what}s"

@@ -1,15 +1,16 @@
 import io
 import re
 from importlib import resources
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from prior_reinforce.arm.console.camera import Calibrate, Look, Pictures
+from prior_reinforce.arm.console.camera import Calibrate, Look, Pictures, _known_points
 from prior_reinforce.arm.console.verbs import Ask, SetGoal
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PerceptionFailedError
-from prior_reinforce.perception.calibration import CAMERA_SD
+from prior_reinforce.perception.calibration import CAMERA_SD, TableCalibration
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from tests.arm.console.pictures import jpeg, pixel
 
@@ -45,6 +46,14 @@ def test_before_anything_there_are_places_to_begin_with(pictures):
     ]
     with pytest.raises(PerceptionFailedError, match="no picture"):
         pictures.file()
+
+
+def test_places_to_begin_with_are_apart_around_a_single_demonstration():
+    axes = [SimpleNamespace(axis=0), SimpleNamespace(axis=1)]
+    points = _known_points(SimpleNamespace(components=axes, shown=[[0.9, 0.1]]))
+    x, y = np.transpose(points)
+    assert (np.ptp(x), np.ptp(y)) == pytest.approx((0.1, 0.1))
+    TableCalibration.fit(points, [pixel(p) for p in points])  # which no points on a line do
 
 
 def test_a_calibration_maps_pixels_to_the_table_and_is_kept(pictures, verbs):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
+from prior_reinforce.adapters import DEFAULT_ADAPTER
 from prior_reinforce.arm.console.verbs import (
     Ask,
     Execute,
@@ -154,6 +155,14 @@ def test_a_goal_keeps_the_adapter_and_says_what_changed(verbs):
     assert (goal.adapter, goal.carry_over, goal.new_hardware) == ("gp", True, "a ball")
     with pytest.raises(InvalidGoalError):
         verbs.goal(SetGoal(seen=state.id, goal=[0.9]))
+
+
+def test_after_a_goal_that_was_set_by_a_session_in_python_another_is_set(verbs):
+    verbs.workspace.session().set_goal([0.9, 0.0])
+    state = verbs.state()
+    assert state.goals[0].adapter == DEFAULT_ADAPTER
+    verbs.goal(SetGoal(seen=state.id, goal=[0.9, 0.1]))
+    assert verbs.workspace.state.goals[-1].adapter == DEFAULT_ADAPTER
 
 
 def test_without_an_executor_the_plan_is_downloaded(verbs):

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from prior_reinforce.arm.executing.arguments import (
-    check_program,
+    check_command,
     split_command,
     without_arguments,
 )
@@ -41,4 +41,4 @@ def test_no_argument_of_a_persons_own_goes_to_the_journal(secret):
 def test_where_what_is_started_cannot_be_found_again_nothing_is(monkeypatch):
     monkeypatch.setattr("sys.platform", "darwin")
     with pytest.raises(ConfigurationError, match=r"on Linux only, .*write the plan with --out"):
-        check_program("true")
+        check_command("true {plan}", time_limit=1.0)

@@ -12,6 +12,8 @@ from prior_reinforce.adapters import ADAPTERS
 from prior_reinforce.adapters.bayesian import BayesianAdapter
 from prior_reinforce.adapters.proportional import ProportionalAdapter
 from prior_reinforce.arm.workspace.execute import execute
+from prior_reinforce.arm.workspace.manifest import parse_manifest
+from prior_reinforce.arm.workspace.template import NewWorkspace, with_columns
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.errors import (
     ConfigurationError,
@@ -470,6 +472,17 @@ def test_an_arm_may_be_known_by_its_first_recordings(tmp_path, names):
         assert workspace.plan(trial).format.names == expected
     with Workspace(tmp_path / "hoop") as workspace:
         assert workspace.session().ask().plan.shape[1] == len(expected)
+
+
+def test_columns_are_written_into_a_section_however_its_head_is_spaced(tmp_path):
+    text = NewWorkspace(robot="none").manifest("hoop")
+    for head in ("[plan]", "[ plan ]", "  [plan]"):
+        told = with_columns(text.replace("[plan]", head), ("one",), ("deg",))
+        form = parse_manifest(told, tmp_path / "workspace.toml").format
+        assert (form.names, form.units) == (("one",), ("deg",))
+    inline = 'plan = { names = ["?"], units = ["rad"], dt = 0.02 }'
+    with pytest.raises(FileFormatError, match=r'no line \[plan\]; .*names = \["one"\]'):
+        with_columns(inline, ("one",), ("deg",))
 
 
 @pytest.mark.slow

@@ -178,7 +178,8 @@ def _known_points(state: State) -> list[list[float]]:
     if not state.shown or not {0, 1} <= {*axes}:
         return _PLACES
     places = 10 * np.array(state.shown)[:, [axes.index(0), axes.index(1)]]
-    (a, b), (c, d) = np.floor(places.min(0)) / 10, np.ceil(places.max(0)) / 10
+    low = np.floor(places.min(0))
+    (a, b), (c, d) = low / 10, np.maximum(np.ceil(places.max(0)), low + 1) / 10
     middle = (b + d) / 2
     six = [[a, d], [a, middle], [a, b], [c, b], [c, middle], [c, d]]
     return np.round(six, 2).tolist()

@@ -33,7 +33,6 @@ from prior_reinforce.arm.workspace.execute import (
     recover,
     say_look,
 )
-from prior_reinforce.arm.workspace.state import Standing
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.errors import PriorReinforceError, TrialStateError, WorkspaceError
 from prior_reinforce.generators.base import FitProgress
@@ -390,7 +389,7 @@ class Verbs:
                         "stopped": str(last_stop(self.folder)),
                         "output": view.output_of(self.workspace, here.state),
                     }
-                    left = _is_executing(here) and not self._is_running()
+                    left = here.executing is not None and not self._is_running()
                     if left and time.monotonic() > looked + _SOMETIMES:
                         looked = time.monotonic()
                         recover(self.workspace)
@@ -402,9 +401,3 @@ class Verbs:
             if now != shown:
                 shown = now
                 self.publish(now)
-
-
-def _is_executing(now: Standing) -> bool:
-    """Whether the journal says that the trial that waits is executing."""
-    trial = now.state.open_trial
-    return trial is not None and now.state.stage(trial) == "executing"

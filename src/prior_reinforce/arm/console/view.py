@@ -154,7 +154,7 @@ def motion_of(workspace: Workspace, number: int) -> MotionView:
         joints = match_joints(plan.format, robot)
         bounds = {c: (float(robot.lower[j]), float(robot.upper[j])) for j, c in joints.items()}
         if robot.chain is not None and len(joints) == len(robot.joint_names):
-            ordered: Frames = frames[:, [joints[j] for j in range(len(joints))]]
+            ordered: Frames = frames[:, [*joints.values()]]
             links = link_places(robot.chain, ordered).round(4).tolist()
     gate = None if trial.gate is None else convert(trial.gate, LimitReport)
     verdict = "no robot in the manifest, no limits checked"

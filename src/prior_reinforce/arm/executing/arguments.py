@@ -59,24 +59,6 @@ def without_arguments(command: str) -> str:
     return shlex.join([program]) + "".join(f" {place}" for place in places)
 
 
-def check_program(command: str) -> None:
-    """Do nothing if a command's program could be started.
-
-    Raises:
-        ConfigurationError: There is no such program, or this is not Linux.
-    """
-    if not sys.platform.startswith("linux"):
-        raise ConfigurationError(
-            "a command is run on Linux only, where all that it starts is found again; write the "
-            "plan with --out and execute it yourself"
-        )
-    program = next(iter(split(command)), "")
-    if "\0" in command or shutil.which(program) is None:
-        raise ConfigurationError(
-            f"cannot start {program!r}; give the path of a program that can run"
-        )
-
-
 def check_command(command: str, *, time_limit: float) -> None:
     """Do nothing if a command and its limit could be used; arguments as in `run_command`.
 
@@ -86,5 +68,13 @@ def check_command(command: str, *, time_limit: float) -> None:
     """
     if not is_positive(time_limit):
         raise ConfigurationError(f"the time limit must be a positive number, got {time_limit!r} s")
-    split_command(command, Path("plan"))
-    check_program(command)
+    program, *_ = split_command(command, Path("plan"))
+    if not sys.platform.startswith("linux"):
+        raise ConfigurationError(
+            "a command is run on Linux only, where all that it starts is found again; write the "
+            "plan with --out and execute it yourself"
+        )
+    if "\0" in command or shutil.which(program) is None:
+        raise ConfigurationError(
+            f"cannot start {program!r}; give the path of a program that can run"
+        )

@@ -162,7 +162,7 @@ def match_joints(format: PlanFormat, limits: RobotLimits) -> dict[int, int]:
     """Match a plan's columns to a robot's joints: by name (`is_joint`), never guessed.
 
     Returns:
-        Column of the plan by index of the robot's joint, for the joints that have one.
+        Column of the plan by index of the robot's joint, for the joints that have one, in order.
 
     Raises:
         InvalidPlanError: Two columns look like one joint, or a joint is in another unit than [rad].

@@ -52,8 +52,7 @@ class DeclaredSymmetry(Struct, frozen=True, forbid_unknown_fields=True):
             about = "base" if isinstance(self.object, str) else self.object
         joints: list[int] = []
         if robot is not None and robot.chain is not None:
-            columns = match_joints(form, robot)
-            joints = [columns[row] for row in sorted(columns)]
+            joints = [*match_joints(form, robot).values()]
             if len(joints) < len(robot.joint_names):
                 raise ConfigurationError(
                     f"a symmetry needs all joints of {robot.robot} in the plan, which has "

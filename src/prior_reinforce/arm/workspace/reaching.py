@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from prior_reinforce.arm.robots import RobotLimits, match_joints
-from prior_reinforce.arm.workspace.sessions import model_in_use
 from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.errors import OutOfReachError
 from prior_reinforce.generators.reach import (
@@ -43,7 +42,7 @@ def require_reach(workspace: Workspace, goal: ArrayLike) -> None:
     shown, place = workspace.demonstrations, as_place(goal, form)
     if shown.symmetry is None:
         return
-    generator, check = model_in_use(workspace.standing, workspace.store), reach_check(workspace)
+    generator, check = workspace.model, reach_check(workspace)
     if why := refusal(generator, place, check):
         straight = _same_direction(shown, shown.symmetry, place)
         if refusal(generator, straight, check):
@@ -65,8 +64,7 @@ def region_of(workspace: Workspace) -> Reach | None:
     shown = workspace.demonstrations
     if shown.symmetry is None or workspace.manifest.robot is None:
         return None
-    generator = model_in_use(workspace.standing, workspace.store)
-    return reach(generator, goals_around(shown), reach_check(workspace))
+    return reach(workspace.model, goals_around(shown), reach_check(workspace))
 
 
 def reach_picture(folder: Path, model: str) -> Path:
@@ -100,8 +98,7 @@ def axis_of(demonstrations: Demonstrations, robot: RobotLimits | None) -> list[s
     symmetry = demonstrations.symmetry
     if symmetry is None or not isinstance(symmetry.chart, Polar):
         return []
-    joints = dict[int, int]() if robot is None else match_joints(demonstrations.format, robot)
-    columns = [joints[row] for row in sorted(joints)]
+    columns = [] if robot is None else [*match_joints(demonstrations.format, robot).values()]
     chain = None if robot is None else robot.chain
     paths = hand_paths(symmetry, demonstrations.plans, chain, columns)
     seen = demonstrations.outcomes_seen

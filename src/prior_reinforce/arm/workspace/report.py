@@ -26,7 +26,7 @@ from prior_reinforce.report import AdaptationRecord, write_report
 from prior_reinforce.report.record import CheckRow
 from prior_reinforce.session.events import Entry, GoalSet, Told
 from prior_reinforce.session.trials import Goal, Trial
-from prior_reinforce.wording import say_reading
+from prior_reinforce.wording import say_count, say_reading
 
 _EXECUTED = ("executing", "executed")
 
@@ -68,7 +68,7 @@ def report_workspace(
     if training is not None and training.remarks:
         facts["Remarks"] = "; ".join(training.remarks)
     claim_folder(folder)
-    title = f"{manifest.name}: {len(goals)} goal" + "s" * (len(goals) > 1)
+    title = f"{manifest.name}: {say_count(len(goals), 'goal')}"
     note = f"No plan was given for {_name_goals(without)}." if without else ""
     reach = None if training is None else reach_picture(now.folder, training.model)
     reach = reach if reach is not None and reach.is_file() and not reach.is_symlink() else None

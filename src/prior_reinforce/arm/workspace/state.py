@@ -11,6 +11,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
+from msgspec import structs
+
+from prior_reinforce.adapters import DEFAULT_ADAPTER
 from prior_reinforce.arm.executing.base import Motion
 from prior_reinforce.arm.executing.lock import is_executing
 from prior_reinforce.arm.workspace.events import (
@@ -23,7 +26,7 @@ from prior_reinforce.arm.workspace.events import (
 )
 from prior_reinforce.arm.workspace.manifest import Manifest
 from prior_reinforce.errors import WorkspaceError
-from prior_reinforce.session.events import Event
+from prior_reinforce.session.events import Event, GoalSet
 from prior_reinforce.session.trials import State, Trial
 
 Stage = Literal["asked", "executing", "executed", "told", "voided"]
@@ -85,6 +88,8 @@ class WorkspaceState(State):
 
     def _apply(self, event: Event, time: str) -> None:
         match event:
+            case GoalSet(adapter=""):  # by a session in Python, which makes it by default
+                super()._apply(structs.replace(event, adapter=DEFAULT_ADAPTER), time)
             case DemonstrationsImported():
                 self.demonstrations = event
             case ModelTrained():
@@ -156,6 +161,26 @@ class Standing:
                 f"import {self.folder} RECORDINGS"
             )
         return self.state.demonstrations
+
+    @property
+    def trained(self) -> ModelTrained:
+        """The training of the model in use.
+
+        Raises:
+            WorkspaceError: There is none, or other demonstrations were imported since.
+        """
+        imported, training = self.imported, self.state.training
+        if training is None or training.demonstrations_sha256 != imported.sha256:
+            why = "other demonstrations were imported since the model was learned"
+            why = why if training is not None else "nothing is learned yet"
+            raise WorkspaceError(f"{why}; run: prior-reinforce learn {self.folder}")
+        return training
+
+    @property
+    def executing(self) -> Trial | None:
+        """The trial that waits, if the journal's last word is that it executes."""
+        trial = self.state.open_trial
+        return trial if trial is not None and self.state.stage(trial) == "executing" else None
 
     def ended_badly(self, trial: Trial) -> bool:
         """Whether nobody wrote down how a trial's execution ended, or it was aborted."""

@@ -16,7 +16,7 @@ from prior_reinforce.arm.robots.presets import GRIPPERS, PRESETS
 from prior_reinforce.arm.robots.urdf import read_urdf
 from prior_reinforce.arm.workspace.declared import read_object
 from prior_reinforce.arm.workspace.manifest import LIMIT_LISTS, UNKNOWN
-from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.registry import parse_choice
 from prior_reinforce.settings import tomllib
 
@@ -171,12 +171,20 @@ def _section_of(arm: str) -> str:
 
 
 def with_columns(text: str, names: Sequence[str], units: Sequence[str]) -> str:
-    """Return a manifest's text with the columns of a plan that were not known when it was made."""
-    start = text.index("[plan]")
-    head, plan = text[:start], text[start:]
-    for key, values in (("names", names), ("units", units)):
-        said = f"{key} = {_toml(values)}".replace("\\", r"\\")
-        plan = re.sub(rf"^[ \t]*{key}[ \t]*=[^\[]*\[[^\]]*\]", said, plan, count=1, flags=re.M)
+    """Return a manifest's text with the columns of a plan that were not known when it was made.
+
+    Raises:
+        FileFormatError: The section has no line of its own.
+    """
+    said = {"names": f"names = {_toml(names)}", "units": f"units = {_toml(units)}"}
+    if (section := re.search(r"^[ \t]*\[[ \t]*plan[ \t]*\]", text, re.M)) is None:
+        raise FileFormatError(
+            f"the manifest has no line [plan]; write one, and below it {', '.join(said.values())}"
+        )
+    head, plan = text[: section.start()], text[section.start() :]
+    for key, line in said.items():
+        line = line.replace("\\", r"\\")
+        plan = re.sub(rf"^[ \t]*{key}[ \t]*=[^\[]*\[[^\]]*\]", line, plan, count=1, flags=re.M)
     return head + plan
 
 

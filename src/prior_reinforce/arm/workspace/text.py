@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 import shlex
 from pathlib import Path
+from typing import Literal
 
 from prior_reinforce.arm.workspace.events import Moved, Moving
 from prior_reinforce.arm.workspace.manifest import Manifest, workspace_around
 from prior_reinforce.arm.workspace.state import Standing
+from prior_reinforce.errors import TrialStateError
 from prior_reinforce.session.trials import Stage, State, Trial
 from prior_reinforce.terminal import plain
 from prior_reinforce.wording import error_example, say_chance, say_reading
@@ -180,6 +182,31 @@ def execute_step(now: Standing, trial: Trial) -> str:
     if trial.number in now.state.cut_off:
         flags.append("--approach")
     return call(now.folder, "ask", *flags)
+
+
+def check_open(now: Standing, trial: Trial, verb: Literal["ask", "tell"]) -> None:
+    """Refuse to give out a trial that is executing, or to take an outcome of none.
+
+    Raises:
+        TrialStateError: With what comes next.
+    """
+    number, stage, cut_off = trial.number, now.state.stage(trial), now.state.cut_off
+    if verb == "ask" and stage == "executing":
+        if now.moving:
+            raise TrialStateError(f"trial {number} is executing now; wait for it")
+        raise TrialStateError(
+            f"trial {number} was executing when the program stopped; did the arm move? If it "
+            f"did, tell or void trial {number}; if it did not, ask again with "
+            "--arm-did-not-move"
+        )
+    if verb == "tell" and stage == "asked" and (number in cut_off or now.manifest.driven_by):
+        why = "the manifest's [arm] has not moved for it"
+        if number in cut_off:
+            why = f"its {cut_off[number]} was not made to its end"
+        raise TrialStateError(
+            f"trial {number} was not executed, {why}: run {execute_step(now, trial)}, or void "
+            "it; drop [arm] from the manifest if something else drives the arm"
+        )
 
 
 def tell_example(manifest: Manifest) -> str:

@@ -22,7 +22,14 @@ from prior_reinforce.files import as_cell
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.session.trials import Goal, Stage, State, Trial
 from prior_reinforce.terminal import plain
-from prior_reinforce.wording import as_html, say_chance, say_place, say_reading, say_tolerance
+from prior_reinforce.wording import (
+    as_html,
+    say_chance,
+    say_count,
+    say_place,
+    say_reading,
+    say_tolerance,
+)
 
 _TRIALS_SHOWN = 3
 
@@ -326,20 +333,16 @@ def _say_goal(view: StatusView, goal: GoalView) -> str:
     place = say_place(goal.goal, view.outcome_format)
     n, hits = view.demonstrations, goal.reached_after
     if hits is not None:
-        total = f"N = {n} demonstration{'s' * (n > 1)} + {hits} = {n + hits}"
-        return f"{place}: reached in {_say_count(hits)} ({total})"
+        total = f"N = {say_count(n, 'demonstration')} + {hits} = {n + hits}"
+        return f"{place}: reached in {say_count(hits, 'trial')} ({total})"
     if goal.number < len(view.goals):
         if not goal.told:
             return f"{place}: not tried"
-        return f"{place}: not reached in {_say_count(goal.told)}"
+        return f"{place}: not reached in {say_count(goal.told, 'trial')}"
     changed = f", new hardware: {goal.new_hardware}" if goal.new_hardware is not None else ""
     carried = ", with earlier goals' trials" if goal.earlier_trials else ""
-    so_far = f"not reached yet, {_say_count(goal.told)} told"
+    so_far = f"not reached yet, {say_count(goal.told, 'trial')} told"
     return f"{place}: {so_far}; adapter {goal.adapter}{carried}{changed}"
-
-
-def _say_count(trials: int) -> str:
-    return "1 trial" if trials == 1 else f"{trials} trials"
 
 
 def trials_table(view: StatusView) -> str:

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from numpy.typing import ArrayLike
 from typing_extensions import Self
 
-from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
+from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER, make_adapter
 from prior_reinforce.arm.robots.gate import check_plan
 from prior_reinforce.arm.robots.plan_files import PlanFile, resample_plan, write_plan
 from prior_reinforce.arm.workspace.events import DemonstrationsImported, ModelTrained
@@ -37,10 +37,10 @@ from prior_reinforce.arm.workspace.manifest import (
     read_text,
 )
 from prior_reinforce.arm.workspace.reaching import axis_of, require_reach
-from prior_reinforce.arm.workspace.sessions import adapter_of_goal, check_open, model_in_use
 from prior_reinforce.arm.workspace.state import Standing, WorkspaceState
 from prior_reinforce.arm.workspace.store import Store
 from prior_reinforce.arm.workspace.template import NewWorkspace, with_columns
+from prior_reinforce.arm.workspace.text import check_open
 from prior_reinforce.arm.workspace.view import StatusView, status_view
 from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.errors import (
@@ -59,7 +59,7 @@ from prior_reinforce.wording import as_html
 if TYPE_CHECKING:
     from prior_reinforce.arm.recordings import ImportResult, Preprocessing
     from prior_reinforce.arm.robots.report import LimitReport
-    from prior_reinforce.generators.base import FitProgress
+    from prior_reinforce.generators.base import FitProgress, Generator
 
 
 class Workspace:
@@ -170,11 +170,16 @@ class Workspace:
         """The demonstrations in use, read once; they fit the manifest of now."""
         return self._demonstrations(self.standing.imported.sha256)
 
+    @property
+    def model(self) -> Generator:
+        """The model in use; a WorkspaceError where there is none, or it is stale."""
+        return self.store.model(self.standing.trained.model)
+
     def session(self) -> Session:
         """The trials of this workspace. Telling needs no model; asking loads it."""
         return Session(
-            lambda: model_in_use(self.standing, self.store),
-            lambda: adapter_of_goal(self.standing),
+            lambda: self.model,
+            lambda: make_adapter(getattr(self.state.goal, "adapter", DEFAULT_ADAPTER)),
             lambda: self.demonstrations,
             tolerance=self.manifest.outcome_format.tolerance,
             log=self.log,
@@ -219,10 +224,8 @@ class Workspace:
         if self.manifest.robot is None:
             return None
         training = self.state.training
-        if training is None:
-            shown = self.demonstrations
-        else:
-            shown = self._demonstrations(training.demonstrations_sha256)
+        sha256 = training.demonstrations_sha256 if training else self.standing.imported.sha256
+        shown = self._demonstrations(sha256)
         form = shown.format if dt is None else dataclasses.replace(shown.format, dt=dt)
         plan = Plan(frames, form)
         return check_plan(plan, self.manifest.robot, shown, self.manifest.gate, condition)
@@ -442,6 +445,6 @@ class Workspace:
     def _demonstrations(self, sha256: str) -> Demonstrations:
         if sha256 not in self._read:
             self._read[sha256] = self.store.demonstrations(sha256)
-        path = self.folder / MANIFEST_FILE
-        self.manifest.check_fit(self._read[sha256], "what was imported", path)
-        return self._read[sha256]
+        found = self._read[sha256]
+        self.manifest.check_fit(found, "what was imported", self.folder / MANIFEST_FILE)
+        return found
