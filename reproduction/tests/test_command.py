@@ -99,7 +99,7 @@ def test_all_leaves_out_what_takes_hours_and_more_is_that():
     assert named["all"] - named["paper"] == {"zero-shot", "adaptation", "ways"}
     assert named["more"] == {
         "sets", "sets-network", "adaptation-network", "papers-form", "papers-loop", "robustness",
-        "variation", "once",
+        "variation", "once", "afternoon",
     }  # fmt: skip
     assert named["all"] == set(RECIPES) - named["more"]
     assert {r.name for r in Reproduce("all", taken_from=Path("x"))._recipes()} == set(RECIPES)
