@@ -12,12 +12,13 @@ import csv
 import math
 import re
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from functools import cached_property
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -36,7 +37,6 @@ _SAMPLE = 40
 """Lines from which a dialect is inferred."""
 _WESTERN = set("°µ²³äöüÄÖÜßàâçéèêëîïôùûñÀÉÈáíóúãõåæøÅÆØ")
 """Non-ASCII characters in tables that a Western Excel saves in its own code page."""
-_COMMA = re.compile(r"[+-]?(0,\d{3}|\d+,(\d{1,2}|\d{4,}))")
 _LIST = re.compile(r"\s*[\[(]\s*[-+.\deE]+([,\s]+[-+.\deE]+)+\s*[\])]\s*")
 _DATE = re.compile(r"\d{4}-\d\d-\d\d|\d{1,2}:\d\d")
 _MOMENT = re.compile(
@@ -155,15 +155,12 @@ def _read_csv(
     blank = delimiter == DELIMITERS["space"]
     widest = max(len(line.split()) if blank else 1 + line.count(delimiter) for _, line in data)
     check_table(path, len(data), widest)
-    mark, lines = delimiter, [line for _, line in data]
-    if blank:
-        mark, lines = " ", [line.strip().replace("\t", " ") for line in lines]
-    cells = csv.reader(
-        (f"{line}\n" for line in lines), delimiter=mark, skipinitialspace=True, strict=True
-    )
+    cells = _split((f"{line}\n" for _, line in data), delimiter, strict=True)
     rows = [(data[cells.line_num - 1][0], [cell.strip() for cell in row]) for row in cells]
     above = [line for i, line in kept if i == data[0][0] - 1 and (i, line) not in data]
-    title = [c.strip() for c in _split(above[0].lstrip(" #%/"), delimiter)] if above else []
+    title = (
+        [c.strip() for c in next(_split([above[0].lstrip(" #%/")], delimiter), [])] if above else []
+    )
     return replace(_table(str(path), rows, head, decimal, title), delimiter=delimiter)
 
 
@@ -184,10 +181,11 @@ def _decoded(path: Path) -> str:
     return text
 
 
-def _split(line: str, delimiter: str) -> list[str]:
+def _split(lines: Iterable[str], delimiter: str, *, strict: bool = False) -> Any:
+    """A reader of the cells of lines (`csv.reader`)."""
     if delimiter == DELIMITERS["space"]:
-        line, delimiter = line.strip().replace("\t", " "), " "
-    return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
+        lines, delimiter = (line.strip().replace("\t", " ") + "\n" for line in lines), " "
+    return csv.reader(lines, delimiter=delimiter, skipinitialspace=True, strict=strict)
 
 
 def _dialect(lines: Sequence[str], delimiter: str | None, decimal: str | None) -> tuple[str, str]:
@@ -195,7 +193,7 @@ def _dialect(lines: Sequence[str], delimiter: str | None, decimal: str | None) -
     body = lines[min(1, len(lines) - 1) :]
 
     def score(dialect: tuple[str, str]) -> tuple[float, int]:
-        rows = [_split(line.rstrip(";,"), dialect[0]) for line in body]
+        rows: list[list[str]] = [next(_split([line.rstrip(";,")], dialect[0]), []) for line in body]
         cells = [cell for row in rows for cell in row if cell.strip()]
         numeric = sum(_is_number(cell, dialect[1]) for cell in cells) / max(len(cells), 1)
         width, often = Counter(map(len, rows)).most_common(1)[0]
@@ -342,8 +340,3 @@ def _is_padding(name: str, column: Sequence[str]) -> bool:
     if not (numbered or unnamed):
         return False
     return not any(column) or (unnamed and list(column) == [str(i) for i in range(len(column))])
-
-
-def counts(values: Column) -> bool:
-    """Whether a column counts rows or tells the time: it increases with every row."""
-    return bool(np.all(np.diff(values) > 0))
