@@ -24,13 +24,12 @@ from prior_reinforce.arm.recordings.recording import (
     Episodes,
     Recording,
     files_at,
-    has_files,
     named_damage,
     natural_order,
 )
 from prior_reinforce.errors import FileFormatError
 
-_SUFFIXES = (".h5", ".hdf5")
+SUFFIXES = (".h5", ".hdf5")
 _KEYS = ("obs/robot0_joint_pos", "obs/agent/qpos", "observations/qpos")
 """Measured positions of the first arm; `actions` are mostly pose increments or targets."""
 _MOST_BESIDE, _MOST_BYTES_OF_NAMES = 64, 100_000
@@ -38,16 +37,11 @@ _MOST_BESIDE, _MOST_BYTES_OF_NAMES = 64, 100_000
 _EPISODE = re.compile(r"(demo|traj|episode)_?\d+")
 
 
-def recognises(source: Path) -> bool:
-    """Whether a path looks like HDF5."""
-    return has_files(source, _SUFFIXES)
-
-
 def read(source: Path, options: ReadOptions) -> Episodes:
     """Read every episode of a file, or of each file of a folder."""
     import h5py
 
-    paths = files_at(source, _SUFFIXES)
+    paths = files_at(source, SUFFIXES)
     for path in paths:
         with named_damage(path, "HDF5"), h5py.File(path, "r") as file:
             data = _own(path, file, "data")
