@@ -145,15 +145,13 @@ def _column(source: Path, features: dict[str, Any], key: str | None) -> str:
 def _listed_lengths(source: Path) -> dict[int, int]:
     """Frames of each episode according to the metadata; empty where it lists none."""
     lengths: dict[int, int] = {}
-    for path in sorted((source / "meta" / "episodes").glob("**/*.parquet")):
+    meta = source / "meta"
+    for path in (*sorted(meta.glob("episodes/**/*.parquet")), *meta.glob("episodes.jsonl")):
         with named_damage(path, "LeRobot's list of episodes"):
-            table = _table(path, ["episode_index", "length"]).to_pydict()
-            pairs = zip(table["episode_index"], table["length"], strict=True)
-            lengths.update({int(episode): int(length) for episode, length in pairs})
-    path = source / "meta" / "episodes.jsonl"
-    if path.is_file():
-        with named_damage(path, "LeRobot's list of episodes"):
-            rows = map(json.loads, path.read_text(encoding="utf-8").splitlines())
+            if path.suffix == ".jsonl":
+                rows = list(map(json.loads, path.read_text(encoding="utf-8").splitlines()))
+            else:
+                rows = _table(path, ["episode_index", "length"]).to_pylist()
             lengths.update({int(row["episode_index"]): int(row["length"]) for row in rows})
     return lengths
 
