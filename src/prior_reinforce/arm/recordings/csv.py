@@ -18,6 +18,7 @@ import numpy as np
 from prior_reinforce.arm.recordings.beside import columns_beside, is_clock, names_said, words
 from prior_reinforce.arm.recordings.clock import (
     FRAME,
+    NO_COLUMN,
     Clock,
     Times,
     hold_together,
@@ -30,7 +31,6 @@ from prior_reinforce.arm.recordings.naming import find_channels, numbered_like, 
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     EPISODE_COLUMNS,
-    NO_COLUMN,
     Episodes,
     Recording,
     files_at,
@@ -39,7 +39,7 @@ from prior_reinforce.arm.recordings.recording import (
     unread,
     without_units,
 )
-from prior_reinforce.arm.recordings.tables import Table, read_table
+from prior_reinforce.arm.recordings.tables import Table, is_unnamed, read_table
 from prior_reinforce.arm.recordings.units import (
     SECONDS,
     Ambiguity,
@@ -302,7 +302,7 @@ def _time_columns(table: Table, options: ReadOptions, others: Sequence[int | Non
         held = [i for i in free if says_time(table.names[i])]
         held = [i for i in held if np.all(np.diff(table.values[:, i]) > 0)]
         return _Times((called[0],), (), tuple({*held, *skipping} - {called[0]}))
-    nameless = [i for i in rising if table.named and _has_no_name(table, i)]
+    nameless = [i for i in rising if table.named and is_unnamed(table.names[i])]
     if nameless and table.nanoseconds(nameless[0]) is not None:
         return _Times((nameless[0],))
     if options.rate is not None:
@@ -334,14 +334,9 @@ def _seconds_and_parts(table: Table) -> _Times | None:
     return None
 
 
-def _has_no_name(table: Table, column: int) -> bool:
-    """Whether a column has no name, as pandas writes an index."""
-    return not table.names[column] or table.names[column].startswith("Unnamed:")
-
-
 def _counts(table: Table, column: int, times: Times) -> bool:
     """Whether a column counts rows or tells the time, which no joint does."""
-    if _has_no_name(table, column):
+    if is_unnamed(table.names[column]):
         return rises(table.stamps(column))
     long = len(table) >= _FEWEST_COUNTS
     return long and is_clock(table.names[column], table.values[:, column], times)

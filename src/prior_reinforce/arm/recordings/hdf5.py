@@ -64,7 +64,12 @@ def _demo(
         key = keys[0]
         arrays = {name: _motion(path, group, name) for name in keys}
         count = len(arrays[key])
-        there = _beside(path, group, count) | arrays
+        # Whatever has as many frames, and may move, tell the time, or mark what is padding.
+        there = {
+            name: _numbers(path, name, _own(path, group, name))
+            for name, own in _shapes(group).items()
+            if own[0] == count and (len(own) == 1 or (len(own) == 2 and may_move(name, own[1])))
+        } | arrays
         texts, stated = _said(path, top, group, key)
         stated |= {n: np.asarray(v) for n, v in made_by.items() if isinstance(v, (int, float))}
         declared = int(stated.get("num_samples", count))
@@ -130,15 +135,6 @@ def _shapes(group: Any) -> dict[str, tuple[int, ...]]:
 
     group.visititems(collect)
     return found
-
-
-def _beside(path: Path, group: Any, count: int) -> dict[str, np.ndarray]:
-    """Arrays of as many frames that may move, tell the time, or mark what is padding."""
-    return {
-        name: _numbers(path, name, _own(path, group, name))
-        for name, own in _shapes(group).items()
-        if own[0] == count and (len(own) == 1 or (len(own) == 2 and may_move(name, own[1])))
-    }
 
 
 def _motion(path: Path, group: Any, key: str) -> np.ndarray:

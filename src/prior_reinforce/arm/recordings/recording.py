@@ -37,8 +37,6 @@ _LARGEST_POINTER, _MOST_FILES = 1024, 5_000
 """Bytes of a Git LFS pointer (its specification), and files that are looked through for one."""
 _LEAP = 3.0
 """Steps of a motion, as large as its largest, that make a leap. Ours."""
-NO_COLUMN = "none"
-"""Value of `time_column` by which no times are read, and of `episode_column`."""
 EPISODE_COLUMNS = tuple(
     name + ending
     for name in ("episode", "throw", "trial", "demo", "run", "wurf", "versuch", "essai", "tiro")

@@ -26,6 +26,7 @@ from prior_reinforce.arm.recordings.units import (
     judge_unit,
     known_unit,
     listed,
+    one_for_all,
     place_names,
     say_names,
 )
@@ -162,11 +163,8 @@ def _spread(unit: str, plan_units: Sequence[str] | None, names: Sequence[str]) -
     """One unit for all channels that can be in it, which no gripper or place is in degrees."""
     base = base_of(unit)[0]
     fits = [base_of(own)[0] == base for own in plan_units or (base,) * len(names)]
-    fits, lengths = fits if any(fits) else [True] * len(fits), place_names(names)
-    return [
-        unit if fit and not (base in TURN and (is_no_angle(name) or name in lengths)) else None
-        for fit, name in zip(fits, names, strict=True)
-    ]
+    each = zip(one_for_all(unit, names), fits, strict=True)
+    return [own if fit or not any(fits) else None for own, fit in each]
 
 
 def _guess_names(
