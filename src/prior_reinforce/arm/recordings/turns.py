@@ -129,21 +129,22 @@ def _align_forms(
     first, passed, turned = motions[0][0, columns], list[str](), list[str]()
     margin = _NEXT * turn / TURN["rad"]
 
-    def apart(one: np.ndarray, other: np.ndarray) -> float:
+    def apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
         step = one - other
-        return float(np.linalg.norm(step - turn * np.round(step / turn) if turn else step))
+        return np.linalg.norm(step - turn * np.round(step / turn) if turn else step, axis=-1)
 
     for episode, motion in zip(selection.episodes, motions, strict=True):
         own = motion[:, columns]
         forms = np.stack([own, other_euler_angles(own, turn) if turn else other_form(own)])
         which = np.zeros(len(own), dtype=int)
+        steps = apart(forms[:, None, 1:], forms[:, :-1])  # of each form now from each before
         for t in range(1, len(own)):
             k = which[t - 1]
-            stays, changes = (apart(forms[form, t], forms[k, t - 1]) for form in (k, 1 - k))
-            which[t] = 1 - k if changes < stays - margin else k
+            changes = steps[1 - k, k, t - 1] < steps[k, k, t - 1] - margin
+            which[t] = 1 - k if changes else k
         if np.any(which):
             passed.append(episode)
-        near, far = (apart(form[0], first) for form in forms)
+        near, far = apart(forms[:, 0], first)
         if far < near - margin:
             which = 1 - which
             turned.append(episode)
