@@ -58,6 +58,10 @@ def test_units_in_words_are_of_the_columns(texts, units):
     assert units_said(texts, ("pan", "lift", "gripper")) == units
 
 
+def test_an_angles_unit_in_words_is_not_of_places():
+    assert units_said({"unit": ("deg",)}, ("x", "y", "pan")) == (None, None, "deg")
+
+
 @pytest.mark.parametrize(
     "said",
     [

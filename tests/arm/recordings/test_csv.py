@@ -250,6 +250,14 @@ def test_a_column_of_throws_by_another_name(tmp_path):
         read_recordings(tmp_path, episode_column="nr")
 
 
+@pytest.mark.parametrize("column", ["chrono", "1"])
+def test_the_column_of_times_tells_throws_apart_by_its_name_or_number(tmp_path, column):
+    lines = ["chrono,joint1"] + [f"{k / 50},{k % 7}" for _ in range(2) for k in range(30)]
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    recordings = read_recordings(tmp_path / "log.csv", time_column=column, time_unit="s")
+    assert [r.episode for r in recordings] == ["log-0", "log-1"]
+
+
 def test_the_column_of_times_may_be_named_or_left_unread(tmp_path):
     (tmp_path / "a.csv").write_text("clock,t,a\n0,5,1\n10,5,2\n20,5,4\n")
     (recording,) = read_recordings(tmp_path, time_column="clock", time_unit="ms", joints=["a"])

@@ -40,6 +40,12 @@ def test_what_is_lost_in_a_channel_that_is_not_taken_does_not_count():
     assert selection.left_out == ""
 
 
+def test_a_lost_frame_makes_no_angle_of_a_gripper_in_shares():
+    q = np.column_stack([np.sin(T), 0.5 + 0.5 * np.sin(T)])
+    q[10, 1] = np.nan
+    assert select([Recording("throw", T, q, ("lift", "gripper"))]).units == ("rad", "1")
+
+
 def test_episodes_are_dropped_by_name():
     two = [Recording(name, T, np.sin(T)[:, None]) for name in "ab"]
     assert select(two).without(["a"]).episodes == ("b",)

@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.clock import Clock, Times, says_time
+from prior_reinforce.arm.recordings.clock import NO_COLUMN, Clock, Times, clock_among, says_time
 from prior_reinforce.arm.recordings.naming import missing_channels, vectors
 from prior_reinforce.arm.recordings.recording import (
-    NO_COLUMN,
     Positions,
     Recording,
     recorded,
@@ -27,8 +26,8 @@ from prior_reinforce.arm.recordings.units import (
     CHANNEL_UNITS,
     SECONDS,
     Ambiguity,
-    is_no_angle,
     known_unit,
+    one_for_all,
     say_names,
 )
 from prior_reinforce.arm.robots.limits import says_no_position
@@ -97,7 +96,7 @@ def recorded_among(
     units = tuple(a or b for a, b in zip(said, units or (None,) * len(said), strict=False))
     if clock is None:
         declared = None if options.time_column == NO_COLUMN else stated
-        clock = options.clock_among(where, episode, kept, arrays, declared)
+        clock = clock_among(where, episode, kept, arrays, options, declared)
     others = {name: array for name, array in arrays.items() if name not in keys}
     more = {"left_out": moves_beside(positions, others, clock.times)} | more
     more["remarks"] = (*more.get("remarks", ()), *why)
@@ -175,15 +174,14 @@ def names_said(
 def units_said(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
     """Return the unit of each column as a file's texts state it; none if they state no unit.
 
-    A single angle's unit holds for all but grippers.
+    A single one holds for all that can be in it.
     """
     for key, own in texts.items():
         if "unit" not in key.lower() or says_time(key) or len(own) not in (1, len(names)):
             continue
         units = [unit if unit in CHANNEL_UNITS else None for unit in map(known_unit, own)]
-        if any(units) and len(own) == 1:
-            no_angle = units[0] in TURN
-            units = [None if no_angle and is_no_angle(name) else units[0] for name in names]
+        if len(own) == 1 and units[0] is not None:
+            units = one_for_all(units[0], names)
         if any(units):
             return tuple(units)
     return (None,) * len(names)
@@ -191,19 +189,15 @@ def units_said(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
 
 def words(said: Any) -> tuple[str, ...]:
     """Return the texts of an array, or of one text that lists several; none if they are none."""
-    found = [t.decode(errors="replace") if isinstance(t, bytes) else t for t in _flat(said)]
+    listed = said.ravel().tolist() if isinstance(said, np.ndarray) else said
+    found = list(listed) if isinstance(listed, (list, tuple)) else [listed]
+    found = [t.decode(errors="replace") if isinstance(t, bytes) else t for t in found]
     if not all(isinstance(text, str) for text in found):
         return ()
     if len(found) == 1:
         text = found[0].strip().strip("[]()")
         found = text.split(",") if "," in text else text.split()
     return tuple(str(text).strip().strip("'\"") for text in found)
-
-
-def _flat(said: Any) -> list[Any]:
-    if isinstance(said, np.ndarray):
-        return list(said.ravel().tolist())
-    return list(said) if isinstance(said, (list, tuple)) else [said]
 
 
 def frames_said(

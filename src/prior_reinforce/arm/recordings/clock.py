@@ -6,13 +6,17 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float, Shaped
 
 from prior_reinforce.arm.recordings.units import SECONDS, Ambiguity, judge_unit, split_unit
 from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidDemonstrationsError
+
+if TYPE_CHECKING:
+    from prior_reinforce.arm.recordings.options import ReadOptions
 
 Times = Float[np.ndarray, " T"]
 """Times of T frames, in [s]."""
@@ -21,6 +25,10 @@ Stamps = Shaped[np.ndarray, "..."]
 FRAME = "frame"
 """The unit of a column that counts frames; the rate says how long one is."""
 TIME_UNITS = (*SECONDS, FRAME)
+NO_COLUMN = "none"
+"""Value of `time_column` by which no times are read, and of `episode_column`."""
+_CALLED = ("t", "time", "timestamp", "timestamps")
+"""Names of arrays that are the times."""
 _SAYS_TIME = re.compile(
     r"(^|[^a-z])(t|ts|times?|timestamps?|stamp|epoch|clock|elapsed|duration|date|secs?|seconds?)"
     r"($|[^a-z])"
@@ -160,7 +168,18 @@ def clock_of(
                 f"--time-unit {time_unit} is of a column of times, and episode {episode} has none; "
                 "drop it, or name the column"
             )
-        return _even(episode, count, rate_name or name, own_rate, rate)
+        own, name = rate or own_rate, rate_name or name
+        if own is None:
+            raise FileFormatError(
+                f"episode {episode} holds neither times nor a rate; give the rate in frames a "
+                "second: --rate"
+            )
+        times = np.arange(count) / own
+        if rate is None:
+            return Clock(times, f"{name} in the file", _doubt_rate(name, own, count))
+        differs = own_rate is not None and not _same(rate, own_rate)
+        said = f" ({name} in the file says {own_rate:g} Hz)" if differs else ""
+        return Clock(times, f"the given rate{said}")
     try:
         numbers = np.asarray(stamps, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -221,6 +240,43 @@ def clock_of(
     return Clock(elapsed * SECONDS[chosen], f"{name} in {chosen}", ambiguities)
 
 
+def clock_among(
+    where: Path,
+    episode: str,
+    count: int,
+    arrays: Mapping[str, np.ndarray],
+    options: ReadOptions,
+    said: Mapping[str, Any] | None = None,
+) -> Clock:
+    """Return times from the arrays of an episode that say they are, held against each other.
+
+    `said` are further numbers of the file, a rate perhaps among them. An array that is asked for by
+    name counts more.
+    """
+    asked, own = options.time_column, declared_rate(where, said or {}, options.rate)
+    there = {name: a.ravel() if a.size == count else a for name, a in arrays.items()}
+    fit = [name for name, array in there.items() if array.shape == (count,)]
+    times = [n for n in there if split_unit(n, SECONDS)[0] in _CALLED]
+    times += [n for n in fit if n not in times and tells_time(n, there[n])]
+    if asked is not None:
+        if asked not in (*there, NO_COLUMN):
+            raise FileFormatError(
+                f"{where} has no array {asked}; it holds {sorted(arrays)}: name one"
+            )
+        times, own = [n for n in there if n == asked], own if not times else {}
+    others = [] if asked else [n for n in fit if skips_frames(there[n])]
+    if not times and others and (own or options.rate is not None):
+        own |= {"stamps": there[others[0]], "name": others[0], "unit": FRAME}
+    if not times:
+        return options.clock(episode, count, **own)
+    first, *others = dict.fromkeys([*times, *others])
+    clock = options.clock(episode, count, stamps=there[first], name=first, **own)
+    if count > 1:
+        held = {name: there[name].astype(float) for name in others if name in fit}
+        hold_together(f"{where}: {episode}", {first: clock.times} | held)
+    return clock
+
+
 def hold_together(where: str, clocks: Mapping[str, Times]) -> None:
     """Refuse times of the same frames that contradict each other, the first being those in use.
 
@@ -249,22 +305,6 @@ def hold_together(where: str, clocks: Mapping[str, Times]) -> None:
                 f"{where}: {name} and {other} part by {apart.max():.3g} s, most at frame {frame}; "
                 f"say which is the time: --time-column {name}, or {other}"
             )
-
-
-def _even(episode: str, count: int, name: str, own_rate: float | None, rate: float | None) -> Clock:
-    """Times at the given rate, else at the declared one."""
-    chosen, source = rate or own_rate, "the given rate"
-    if chosen is None:
-        raise FileFormatError(
-            f"episode {episode} holds neither times nor a rate; give the rate in frames a second: "
-            "--rate"
-        )
-    ambiguities = tuple[Ambiguity, ...]()
-    if rate is None:
-        source, ambiguities = f"{name} in the file", _doubt_rate(name, chosen, count)
-    elif own_rate is not None and not _same(rate, own_rate):
-        source = f"the given rate ({name} in the file says {own_rate:g} Hz)"
-    return Clock(np.arange(count) / chosen, source, ambiguities)
 
 
 def _doubt_rate(name: str, rate: float, count: int) -> tuple[Ambiguity, ...]:

@@ -18,6 +18,7 @@ import numpy as np
 from prior_reinforce.arm.recordings.beside import columns_beside, is_clock, names_said, words
 from prior_reinforce.arm.recordings.clock import (
     FRAME,
+    NO_COLUMN,
     Clock,
     Times,
     hold_together,
@@ -30,7 +31,6 @@ from prior_reinforce.arm.recordings.naming import find_channels, numbered_like, 
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     EPISODE_COLUMNS,
-    NO_COLUMN,
     Episodes,
     Recording,
     files_at,
@@ -39,7 +39,7 @@ from prior_reinforce.arm.recordings.recording import (
     unread,
     without_units,
 )
-from prior_reinforce.arm.recordings.tables import Table, counts, read_table
+from prior_reinforce.arm.recordings.tables import Table, is_unnamed, read_table
 from prior_reinforce.arm.recordings.units import (
     SECONDS,
     Ambiguity,
@@ -111,15 +111,14 @@ def _throws(
     that numbers long stretches of rows may.
     """
     whole = [stem] * len(table)
-    if options.episode_column is not None:
-        if options.episode_column == NO_COLUMN:
-            return None, whole, ()
-        column = _named_column(table, options.episode_column, "--episode-column")
-        return column, table.cells[column], ()
+    if options.episode_column == NO_COLUMN:
+        return None, whole, ()
     names = [name.lower() for name in table.names if table.named]
-    for i, name in enumerate(names):
-        if name in EPISODE_COLUMNS:
-            return i, table.cells[i], ()
+    column = next((i for i, name in enumerate(names) if name in EPISODE_COLUMNS), None)
+    if options.episode_column is not None:
+        column = _named_column(table, options.episode_column, "--episode-column")
+    if column is not None:
+        return column, table.cells[column], ()
     if not (alone and names):
         return None, whole, ()
     starts = _starts(table, options)
@@ -147,11 +146,8 @@ def _throws(
 
 def _starts(table: Table, options: ReadOptions) -> list[int]:
     """Rows in which the time begins anew, with the first."""
-    bare = [split_unit(name, SECONDS)[0].lower() for name in table.names]
-    time = next((i for i, name in enumerate(bare) if name in _TIMES), None)
-    if options.time_column in (*table.names, *bare):
-        time = _named_column(table, str(options.time_column), "--time-column")
-    if time is None or options.time_column == NO_COLUMN or not table.is_number(time):
+    time = next(iter(_called_times(table, options)), None)
+    if time is None or not table.is_number(time):
         return [0]
     times = table.values[:, time]
     steps = np.diff(times)
@@ -159,6 +155,15 @@ def _starts(table: Table, options: ReadOptions) -> list[int]:
     anew = np.all(np.abs(times[falls] - times[0]) <= 2 * np.median(np.abs(steps)))
     long = np.min(np.diff([0, *falls, len(times)])) >= _FEWEST_COUNTS
     return [0, *falls] if anew and long else [0]
+
+
+def _called_times(table: Table, options: ReadOptions) -> list[int]:
+    """The column that is given as the time; else those that are called like one."""
+    if options.time_column is not None:
+        none = options.time_column == NO_COLUMN
+        return [] if none else [_named_column(table, options.time_column, "--time-column")]
+    bare = (split_unit(name, SECONDS)[0].lower() for name in table.names if table.named)
+    return [i for i, name in enumerate(bare) if name in _TIMES]
 
 
 def _named_column(table: Table, name: str, option: str) -> int:
@@ -182,15 +187,19 @@ def _episode(
     guessed: tuple[Ambiguity, ...],
 ) -> Recording:
     log = next((g for g in LOG_FORMATS if set(g.columns) <= set(table.names)), None)
-    joints = options.joints if table.named else None
     said, told = _names_in_cells(table, options)
     called = [name or f"column {i + 1}" for i, name in enumerate(table.names)]
     names = [said.get(i, name) for i, name in enumerate(table.names)]
+    joints = options.joints if table.named else None
     found = None if joints is None else find_channels(joints, names)
     times = _time_columns(table, options, [episode_column, *(found or ())])
     aside = {*times.columns, *times.held, episode_column, *told}
     others = [i for i in range(len(names)) if i not in aside]
-    channels, named = _channels(table, names, others, options, log)
+    channels, named = list(others), table.named
+    if found and not options.key and {*found} <= {*others}:
+        channels = found
+    elif table.named and (keys := options.key or ((log.key,) if log else ())):
+        channels, named = _by_key(table, keys, others, options.joints or ()), False
     remarks = []
     if log is not None:
         remarks.append(f"{log.name}: time in {log.time_unit}, motion is {log.key} (measured)")
@@ -198,7 +207,9 @@ def _episode(
     counts = [i for i in others if table.is_number(i) and _counts(table, i, clock.times)]
     rising = [i for i in counts if channels == others and table.named and not options.joints]
     all_read = not options.key and found is None
-    texts = [i for i in others if table.is_text(i) and (all_read or _switches(table, i))]
+    texts = [i for i in others if table.is_text(i)]
+    if not all_read:  # else only those that change between a few: `on` and `off`
+        texts = [i for i in texts if 1 < len({*table.cells[i]} - {""}) <= _MOST_WORDS]
     for left, why in (
         (rising, "rises with every row, as times and counters do"),
         (texts, "holds no number"),
@@ -263,11 +274,6 @@ def _cells(table: Table, columns: Sequence[int], row: int) -> tuple[str, ...]:
     return words(own[0] if len(own) == 1 else own)
 
 
-def _switches(table: Table, column: int) -> bool:
-    """Whether a column of texts changes between a few of them: `on` and `off`."""
-    return 1 < len({*table.cells[column]} - {""}) <= _MOST_WORDS
-
-
 class _Times(NamedTuple):
     """Which columns are the time."""
 
@@ -282,23 +288,21 @@ class _Times(NamedTuple):
 
 def _time_columns(table: Table, options: ReadOptions, others: Sequence[int | None]) -> _Times:
     """The columns of times; whatever rises steadily, and is no joint, may be one."""
-    if options.time_column == NO_COLUMN:
-        return _Times()
+    called = _called_times(table, options)
     if options.time_column is not None:
-        return _Times((_named_column(table, options.time_column, "--time-column"),))
+        return _Times(tuple(called))
     if (pair := _seconds_and_parts(table)) is not None:
         return pair
-    names = [split_unit(name, SECONDS)[0] if table.named else "" for name in table.names]
-    free = [i for i in range(len(names)) if i not in others]
+    free = [i for i in range(len(table.names)) if i not in others]
     rising = [i for i in free if rises(table.stamps(i))]
     skipping = [i for i in free if skips_frames(table.values[:, i])]
-    known = [i for i in free if names[i].lower() in _TIMES]
-    called = [i for i in free if table.named and tells_time(table.names[i], table.stamps(i))]
-    if known or called:
-        time = [*known, *called][0]
-        held = [i for i in free if says_time(table.names[i]) and counts(table.values[:, i])]
-        return _Times((time,), (), tuple({*held, *skipping} - {time}))
-    nameless = [i for i in rising if table.named and _has_no_name(table, i)]
+    called = [i for i in called if i in free]
+    called += [i for i in free if table.named and tells_time(table.names[i], table.stamps(i))]
+    if called:
+        held = [i for i in free if says_time(table.names[i])]
+        held = [i for i in held if np.all(np.diff(table.values[:, i]) > 0)]
+        return _Times((called[0],), (), tuple({*held, *skipping} - {called[0]}))
+    nameless = [i for i in rising if table.named and is_unnamed(table.names[i])]
     if nameless and table.nanoseconds(nameless[0]) is not None:
         return _Times((nameless[0],))
     if options.rate is not None:
@@ -306,7 +310,7 @@ def _time_columns(table: Table, options: ReadOptions, others: Sequence[int | Non
         long = len(table) >= _FEWEST_COUNTS
         rising = [i for i in rising if long and np.any(np.diff(table.stamps(i)) != 1)]
         return _Times((*skipping, *rising)[:1], unit=FRAME if skipping else None)
-    if rising and len(names) > 1:
+    if rising and len(table.names) > 1:
         first = rising[0]
         shown = table.names[first] if table.named and table.names[first] else f"{first + 1}"
         column = f"column {first + 1}" if shown.isdigit() else shown
@@ -330,14 +334,9 @@ def _seconds_and_parts(table: Table) -> _Times | None:
     return None
 
 
-def _has_no_name(table: Table, column: int) -> bool:
-    """Whether a column has no name, as pandas writes an index."""
-    return not table.names[column] or table.names[column].startswith("Unnamed:")
-
-
 def _counts(table: Table, column: int, times: Times) -> bool:
     """Whether a column counts rows or tells the time, which no joint does."""
-    if _has_no_name(table, column):
+    if is_unnamed(table.names[column]):
         return rises(table.stamps(column))
     long = len(table) >= _FEWEST_COUNTS
     return long and is_clock(table.names[column], table.values[:, column], times)
@@ -363,27 +362,12 @@ def _clock(
     return clock
 
 
-def _channels(
-    table: Table,
-    called: Sequence[str],
-    others: Sequence[int],
-    options: ReadOptions,
-    log: LogFormat | None,
-) -> tuple[list[int], bool]:
-    """Columns of the motion, and whether they are called like joints.
-
-    Only these need to be numbers in every row; a log may carry others beside them.
-    """
-    names, joints = [table.names[i] for i in others], options.joints or ()
-    if not table.named:
-        return list(others), False
-    if not options.key and joints:
-        found = find_channels(joints, [called[i] for i in others])
-        if found is not None:
-            return [others[i] for i in found], True
-    keys, groups = options.key or ((log.key,) if log else ()), vectors(names)
-    if not keys:
-        return list(others), True
+def _by_key(
+    table: Table, keys: Sequence[str], others: Sequence[int], joints: Sequence[str]
+) -> list[int]:
+    """Columns of the motion by the name before their numbers; by their own, those beside them."""
+    names = [table.names[i] for i in others]
+    groups = vectors(names)
     columns = []
     for key in keys:
         if key not in groups and key not in names:
@@ -396,4 +380,4 @@ def _channels(
     if len(columns) + len(by_name) == len(joints):  # a gripper beside a log's joints
         rest = iter(columns)
         columns = [by_name[j] if j in by_name else next(rest) for j in joints]
-    return columns, False
+    return columns

@@ -24,13 +24,12 @@ from prior_reinforce.arm.recordings.recording import (
     Episodes,
     Recording,
     files_at,
-    has_files,
     named_damage,
     natural_order,
 )
 from prior_reinforce.errors import FileFormatError
 
-_SUFFIXES = (".h5", ".hdf5")
+SUFFIXES = (".h5", ".hdf5")
 _KEYS = ("obs/robot0_joint_pos", "obs/agent/qpos", "observations/qpos")
 """Measured positions of the first arm; `actions` are mostly pose increments or targets."""
 _MOST_BESIDE, _MOST_BYTES_OF_NAMES = 64, 100_000
@@ -38,16 +37,11 @@ _MOST_BESIDE, _MOST_BYTES_OF_NAMES = 64, 100_000
 _EPISODE = re.compile(r"(demo|traj|episode)_?\d+")
 
 
-def recognises(source: Path) -> bool:
-    """Whether a path looks like HDF5."""
-    return has_files(source, _SUFFIXES)
-
-
 def read(source: Path, options: ReadOptions) -> Episodes:
     """Read every episode of a file, or of each file of a folder."""
     import h5py
 
-    paths = files_at(source, _SUFFIXES)
+    paths = files_at(source, SUFFIXES)
     for path in paths:
         with named_damage(path, "HDF5"), h5py.File(path, "r") as file:
             data = _own(path, file, "data")
@@ -70,7 +64,12 @@ def _demo(
         key = keys[0]
         arrays = {name: _motion(path, group, name) for name in keys}
         count = len(arrays[key])
-        there = _beside(path, group, count) | arrays
+        # Whatever has as many frames, and may move, tell the time, or mark what is padding.
+        there = {
+            name: _numbers(path, name, _own(path, group, name))
+            for name, own in _shapes(group).items()
+            if own[0] == count and (len(own) == 1 or (len(own) == 2 and may_move(name, own[1])))
+        } | arrays
         texts, stated = _said(path, top, group, key)
         stated |= {n: np.asarray(v) for n, v in made_by.items() if isinstance(v, (int, float))}
         declared = int(stated.get("num_samples", count))
@@ -136,15 +135,6 @@ def _shapes(group: Any) -> dict[str, tuple[int, ...]]:
 
     group.visititems(collect)
     return found
-
-
-def _beside(path: Path, group: Any, count: int) -> dict[str, np.ndarray]:
-    """Arrays of as many frames that may move, tell the time, or mark what is padding."""
-    return {
-        name: _numbers(path, name, _own(path, group, name))
-        for name, own in _shapes(group).items()
-        if own[0] == count and (len(own) == 1 or (len(own) == 2 and may_move(name, own[1])))
-    }
 
 
 def _motion(path: Path, group: Any, key: str) -> np.ndarray:

@@ -5,12 +5,12 @@ A format is a file beside this one and a line of `FORMATS`.
 
 from __future__ import annotations
 
-import functools
 import os
 import warnings
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -54,25 +54,20 @@ class Format:
     """From names and layout alone; nothing large is opened."""
     library: str = ""
     """Optional library that reading needs, one of `extras.EXTRA_OF`."""
-    options: frozenset[str] = frozenset({"key"})
+    options: frozenset[str] = frozenset()
     """Fields of `ReadOptions` that apply to this format, beside those that apply to all."""
     whole: bool = False
     """A folder laid out like this is this format, whatever else lies in it."""
 
 
-def _with_suffix(suffixes: tuple[str, ...]) -> Callable[[Path], bool]:
-    return lambda source: has_files(source, suffixes)
-
-
-_ARRAYS = frozenset({"key", "time_column"})
-_OPTIONAL = _ARRAYS | {"episode_column", "delimiter", "decimal"}
+_OF_TABLES = frozenset({"episode_column", "delimiter", "decimal"})
 FORMATS: Mapping[str, Format] = {
-    "npz": Format(npz.read, _with_suffix(npz.SUFFIXES), options=_ARRAYS),
-    "csv": Format(csv.read, _with_suffix(csv.SUFFIXES), options=_OPTIONAL),
-    "lerobot": Format(lerobot.read, lerobot.recognises, "pyarrow", _ARRAYS, whole=True),
-    "hdf5": Format(hdf5.read, hdf5.recognises, "h5py", _ARRAYS),
-    "ros": Format(ros.read, ros.recognises, "rosbags", _ARRAYS),
-    "zarr": Format(zarr.read, zarr.recognises, "zarr", _ARRAYS, whole=True),
+    "npz": Format(npz.read, partial(has_files, suffixes=npz.SUFFIXES)),
+    "csv": Format(csv.read, partial(has_files, suffixes=csv.SUFFIXES), options=_OF_TABLES),
+    "lerobot": Format(lerobot.read, lerobot.recognises, "pyarrow", whole=True),
+    "hdf5": Format(hdf5.read, partial(has_files, suffixes=hdf5.SUFFIXES), "h5py"),
+    "ros": Format(ros.read, ros.recognises, "rosbags"),
+    "zarr": Format(zarr.read, zarr.recognises, "zarr", whole=True),
 }
 """What can be read. `hdf5` covers robomimic, ManiSkill and ALOHA; `ros` ROS 1 bags, ROS 2 sqlite
 bags and MCAP; `zarr` is the replay buffer of Diffusion Policy."""
@@ -353,15 +348,20 @@ def read(source: str | os.PathLike[str], options: ReadOptions | None = None) -> 
         raise FileFormatError(f"no recording at {source}; give the path of a file or a folder")
     refuse_pointers(source)
     kind = options.format or detect_format(source)
-    for name in sorted(_OPTIONAL & options.given.keys() - FORMATS[kind].options):
+    for name in sorted(_OF_TABLES & options.given.keys() - FORMATS[kind].options):
         option = name.replace("_", "-")
         raise ConfigurationError(f"--{option} {options.given[name]} has no use for {kind}; drop it")
     if FORMATS[kind].library:
         check_installed(FORMATS[kind].library)
+    episodes = FORMATS[kind].read(source, options)
+    if options.rests:
+        every = FORMATS[kind].read(source, replace(options, episodes=None, leave_out=None))
+        parts = (part for _, episode in every for part in at_rests(episode(), options.rests))
+        episodes = ((part.episode, partial(replace, part)) for part in parts)
     there: list[str] = []
     read_ones: dict[str, Recording] = {}
     numbers = 0
-    for name, episode in _cut(FORMATS[kind], source, options):
+    for name, episode in episodes:
         there.append(name)
         if not options.leaves_out(name):
             read_ones[name] = episode()
@@ -382,16 +382,6 @@ def read(source: str | os.PathLike[str], options: ReadOptions | None = None) -> 
         raise InvalidDemonstrationsError(f"{what} in {source}; it has {names}: name those")
     chosen = tuple(read_ones[name] for name in wanted if name in read_ones)
     return Recordings(source, kind, options, chosen)
-
-
-def _cut(format: Format, source: Path, options: ReadOptions) -> Episodes:
-    """Every episode of a source, or of those every part between rests."""
-    if not options.rests:
-        yield from format.read(source, options)
-        return
-    for _, episode in format.read(source, replace(options, episodes=None, leave_out=None)):
-        for part in at_rests(episode(), options.rests):
-            yield part.episode, functools.partial(replace, part)
 
 
 def detect_format(source: Path) -> str:

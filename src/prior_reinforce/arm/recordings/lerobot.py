@@ -20,10 +20,17 @@ from jaxtyping import Shaped
 
 from prior_reinforce.arm.recordings.beside import may_move, recorded_among
 from prior_reinforce.arm.recordings.bounds import check_bytes, check_numbers
-from prior_reinforce.arm.recordings.clock import Clock, Times, hold_together, says_time, tells_time
+from prior_reinforce.arm.recordings.clock import (
+    NO_COLUMN,
+    Clock,
+    Times,
+    clock_among,
+    hold_together,
+    says_time,
+    tells_time,
+)
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
-    NO_COLUMN,
     Episodes,
     Positions,
     Recording,
@@ -54,9 +61,20 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         info = json.loads(info_path.read_text(encoding="utf-8"))
         features = dict(info["features"])
         rate = float(info["fps"])
-        keys = tuple(_column(source, features, key) for key in options.key or (None,))
+        widths = {n: w for n, w in _widths(features).items() if w > 0}
+        vectors = [
+            n for n, w in widths.items() if w > 1 and features[n]["dtype"].startswith("float")
+        ]
+        usual = _MEASURED if _MEASURED in vectors else vectors[0] if len(vectors) == 1 else ""
+        keys = options.key or (usual,)
+        wrong = [key for key in keys if key not in features]
+        if wrong:
+            raise FileFormatError(
+                f"{source} has no feature {wrong[0] or _MEASURED}; features of numbers are "
+                f"{vectors}: say which with the key"
+            )
         key = keys[0]
-        widths = {n: w for n, w in _widths(features).items() if w > 0 and n not in _OWN}
+        widths = {n: w for n, w in widths.items() if n not in _OWN}
         beside = [
             n for n, w in widths.items() if n not in keys and (may_move(n, w) or says_time(n))
         ]
@@ -108,7 +126,7 @@ def _clock(
     late = np.abs(stamps - stamps[0] - (index - index[0]) / rate).max() > _LATE / rate
     # With a rate from the command line, stamps are asked for by name only.
     if asked or (late and options.rate is None and options.time_column is None):
-        return options.clock_among(source, episode, len(index), clocks, {"fps": rate})
+        return clock_among(source, episode, len(index), clocks, options, {"fps": rate})
     clock = options.clock(episode, len(index), rate_name="fps", own_rate=rate)
     clock = replace(clock, times=index * clock.period)
     others = {n: a for n, a in clocks.items() if n != _STAMPS and tells_time(n, a)}
@@ -129,31 +147,16 @@ def _widths(features: dict[str, Any]) -> dict[str, int]:
     }
 
 
-def _column(source: Path, features: dict[str, Any], key: str | None) -> str:
-    vectors = [n for n, width in _widths(features).items() if width > 1]
-    vectors = [name for name in vectors if features[name]["dtype"].startswith("float")]
-    if key is None and (_MEASURED in vectors or len(vectors) == 1):
-        return _MEASURED if _MEASURED in vectors else vectors[0]
-    if key is None or key not in features:
-        raise FileFormatError(
-            f"{source} has no feature {key or _MEASURED}; features of numbers are {vectors}: say "
-            "which with the key"
-        )
-    return key
-
-
 def _listed_lengths(source: Path) -> dict[int, int]:
     """Frames of each episode according to the metadata; empty where it lists none."""
     lengths: dict[int, int] = {}
-    for path in sorted((source / "meta" / "episodes").glob("**/*.parquet")):
+    meta = source / "meta"
+    for path in (*sorted(meta.glob("episodes/**/*.parquet")), *meta.glob("episodes.jsonl")):
         with named_damage(path, "LeRobot's list of episodes"):
-            table = _table(path, ["episode_index", "length"]).to_pydict()
-            pairs = zip(table["episode_index"], table["length"], strict=True)
-            lengths.update({int(episode): int(length) for episode, length in pairs})
-    path = source / "meta" / "episodes.jsonl"
-    if path.is_file():
-        with named_damage(path, "LeRobot's list of episodes"):
-            rows = map(json.loads, path.read_text(encoding="utf-8").splitlines())
+            if path.suffix == ".jsonl":
+                rows = list(map(json.loads, path.read_text(encoding="utf-8").splitlines()))
+            else:
+                rows = _table(path, ["episode_index", "length"]).to_pylist()
             lengths.update({int(row["episode_index"]): int(row["length"]) for row in rows})
     return lengths
 

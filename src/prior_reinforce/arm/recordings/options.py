@@ -3,31 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import numpy as np
 import tyro
 
-from prior_reinforce.arm.recordings.clock import (
-    FRAME,
-    TIME_UNITS,
-    Clock,
-    clock_of,
-    declared_rate,
-    hold_together,
-    skips_frames,
-    tells_time,
-)
-from prior_reinforce.arm.recordings.recording import NO_COLUMN
+from prior_reinforce.arm.recordings.clock import TIME_UNITS, Clock, clock_of
 from prior_reinforce.arm.recordings.tables import DELIMITERS
-from prior_reinforce.arm.recordings.units import SECONDS, split_unit
-from prior_reinforce.errors import ConfigurationError, FileFormatError
-
-TIMES = ("t", "time", "timestamp", "timestamps")
-"""Names of arrays that are the times."""
+from prior_reinforce.errors import ConfigurationError
 
 
 @dataclass(frozen=True)
@@ -110,39 +93,3 @@ class ReadOptions:
     def clock(self, episode: str, count: int, **of_file: Any) -> Clock:
         """Return an episode's times from these options and what the file says (`clock_of`)."""
         return clock_of(episode, count, rate=self.rate, time_unit=self.time_unit, **of_file)
-
-    def clock_among(
-        self,
-        where: Path,
-        episode: str,
-        count: int,
-        arrays: Mapping[str, np.ndarray],
-        said: Mapping[str, Any] | None = None,
-    ) -> Clock:
-        """Return times from the arrays of an episode that say they are, held against each other.
-
-        `said` are further numbers of the file, a rate perhaps among them. An array that is asked
-        for by name counts more.
-        """
-        own = declared_rate(where, said or {}, self.rate)
-        there = {name: a.ravel() if a.size == count else a for name, a in arrays.items()}
-        fit = [name for name, array in there.items() if array.shape == (count,)]
-        times = [n for n in there if split_unit(n, SECONDS)[0] in TIMES]
-        times += [n for n in fit if n not in times and tells_time(n, there[n])]
-        if self.time_column is not None:
-            if self.time_column not in (*there, NO_COLUMN):
-                raise FileFormatError(
-                    f"{where} has no array {self.time_column}; it holds {sorted(arrays)}: name one"
-                )
-            times, own = [n for n in there if n == self.time_column], own if not times else {}
-        others = [] if self.time_column else [n for n in fit if skips_frames(there[n])]
-        if not times and others and (own or self.rate is not None):
-            own |= {"stamps": there[others[0]], "name": others[0], "unit": FRAME}
-        if not times:
-            return self.clock(episode, count, **own)
-        first, *others = dict.fromkeys([*times, *others])
-        clock = self.clock(episode, count, stamps=there[first], name=first, **own)
-        if count > 1:
-            held = {name: there[name].astype(float) for name in others if name in fit}
-            hold_together(f"{where}: {episode}", {first: clock.times} | held)
-        return clock

@@ -37,8 +37,6 @@ _LARGEST_POINTER, _MOST_FILES = 1024, 5_000
 """Bytes of a Git LFS pointer (its specification), and files that are looked through for one."""
 _LEAP = 3.0
 """Steps of a motion, as large as its largest, that make a leap. Ours."""
-NO_COLUMN = "none"
-"""Value of `time_column` by which no times are read, and of `episode_column`."""
 EPISODE_COLUMNS = tuple(
     name + ending
     for name in ("episode", "throw", "trial", "demo", "run", "wurf", "versuch", "essai", "tiro")
@@ -116,16 +114,12 @@ class Recording:
                 f"{episode}: time is {times[bad[0]]} at frame {bad[0]}, expected a finite number; "
                 "mend or drop that episode"
             )
+        remarks, frames = self.remarks, _without_zeros(positions)
+        if frames < times.size:
+            remarks += (f"{times.size - frames} frames at the end left out, which are all 0",)
+            times, positions = times[:frames], positions[:frames]
         # A frame that repeats the one before, time and all; another at the same time is an error.
         same = (np.diff(times) == 0) & np.all(np.diff(positions, axis=0) == 0, axis=1)
-        remarks, kept_frames = self.remarks, _without_zeros(positions)
-        if kept_frames < times.size:
-            remarks += (f"{times.size - kept_frames} frames at the end left out, which are all 0",)
-            times, positions, same = (
-                times[:kept_frames],
-                positions[:kept_frames],
-                same[: kept_frames - 1],
-            )
         if np.any(same) and not np.all(same):
             kept = np.concatenate([[True], ~same])
             times, positions = times[kept], positions[kept]

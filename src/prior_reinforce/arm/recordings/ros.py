@@ -92,7 +92,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         # A link inside could name any file of this machine.
         for path in bag.iterdir() if bag.is_dir() else ():
             require_inside(path, bag)
-        files = _files_of(bag) if bag.is_dir() else [bag]
+        files = _files_of(bag)
         if len(files) > 1:
             raise FileFormatError(
                 f"{bag} holds {len(files)} files of a bag and no metadata.yaml, as a recorder that "
@@ -131,22 +131,16 @@ def read(source: Path, options: ReadOptions) -> Episodes:
 def _bags_at(source: Path) -> list[Path]:
     """The bags a path stands for: itself, or those of its folder; empty if there are none."""
     if not source.is_dir() or (source / "metadata.yaml").is_file():
-        return [source] if _is_bag(source) else []
-    found = source.iterdir()
-    return sorted(filter(_is_bag, found), key=natural_order)
+        return [source] if _files_of(source) else []
+    return sorted(filter(_files_of, source.iterdir()), key=natural_order)
 
 
-def _is_bag(path: Path) -> bool:
-    return (path.is_file() and has_suffix(path, _SUFFIXES)) or _files_of(path) != []
-
-
-def _files_of(folder: Path) -> list[Path]:
-    """What to open of a bag's folder: itself, or its only file where its recorder was killed."""
-    if not folder.is_dir():
-        return []
-    if (folder / "metadata.yaml").is_file():
-        return [folder]
-    return [path for path in folder.iterdir() if path.is_file() and has_suffix(path, _SUFFIXES)]
+def _files_of(bag: Path) -> list[Path]:
+    """What to open of a bag: itself, or the files of a folder whose recorder was killed."""
+    if bag.is_file() or (bag / "metadata.yaml").is_file():
+        return [bag] if bag.is_dir() or has_suffix(bag, _SUFFIXES) else []
+    within = bag.iterdir() if bag.is_dir() else ()
+    return [path for path in within if path.is_file() and has_suffix(path, _SUFFIXES)]
 
 
 def _numbers(topic: str, message: Any) -> Any:
@@ -304,7 +298,11 @@ def _clock_of(
     The recorder's clock holds them in a queue, and so is late and uneven; but where the header's
     jumps and the recorder's does not, the header's was set meanwhile.
     """
-    sent, came = _since_first(header), _since_first(recorder)
+    # Since the first stamp; since 1970, nanoseconds would be 256 ns coarse as floats.
+    sent, came = (
+        np.array([stamp - stamps[0] for stamp in stamps], dtype=np.float64)
+        for stamps in (header, recorder)
+    )
     names = {_HEADER: (sent, "header stamps"), _RECORDER: (came, "the recorder's stamps")}
     if asked not in (None, *names):
         raise ConfigurationError(
@@ -332,11 +330,6 @@ def _clock_of(
             f"{came[-1] * 1e-9:.3g} s; say which are right: --time-column {_HEADER}, or {_RECORDER}"
         )
     return *names[_HEADER], []
-
-
-def _since_first(stamps: list[int]) -> Times:
-    """Nanoseconds since the first stamp; since 1970 they would be 256 ns coarse as floats."""
-    return np.array([stamp - stamps[0] for stamp in stamps], dtype=np.float64)
 
 
 def _trajectory(bag: Path, episode: str, message: Any, options: ReadOptions) -> Recording:

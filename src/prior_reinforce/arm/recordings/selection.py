@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -26,6 +26,7 @@ from prior_reinforce.arm.recordings.units import (
     judge_unit,
     known_unit,
     listed,
+    one_for_all,
     place_names,
     say_names,
 )
@@ -112,37 +113,27 @@ def select(
     if not joints or len(set(joints)) != len(joints):
         raise ConfigurationError(f"joints must be names that differ, got {list(joints)}")
     given: Literal["no", "one for all", "each"] = "no" if units is None else "each"
-    spread: Sequence[str | None] | None = units
-    if units is not None and len(units) == 1 and len(joints) > 1:
-        given, spread = "one for all", _spread(units[0], plan_units, names)
-    n_units = len(joints) if spread is None else len(spread)
-    if len(names) != len(joints) or n_units != len(joints):
+    stated: list[str | None] = [None] * len(joints) if units is None else [*units]
+    if units is not None and len(units) == 1 < len(joints):
+        given, stated = "one for all", _spread(units[0], plan_units, names)
+    if len(names) != len(joints) or len(stated) != len(joints):
         raise ConfigurationError(
             f"{len(joints)} joints need as many names and units, got {len(names)} names and "
-            f"{n_units} units: {list(joints)}"
+            f"{len(stated)} units: {list(joints)}"
         )
     joints, guessed = _guess_names(recordings[0], joints) if unnamed else (joints, ())
     columns = [_columns(recording, joints, names) for recording in recordings]
-    if spread is not None and given == "each" and not recordings[0].named:
-        spread = [spread[i] for i in find_channels(names, joints) or range(len(joints))]
-    said = [
-        _said_unit(recordings, columns, i, None if spread is None else spread[i])
-        for i in range(len(joints))
-    ]
-    no_angles = {name for group in attitudes(names) if len(group) == 4 for name in group}
-    most = [
-        max(np.abs(r.positions[:, c[i]]).max() for r, c in zip(recordings, columns, strict=True))
-        for i in range(len(names))
-    ]
-    lengths = place_names(names)
-    no_angles |= {n for n, m in zip(names, most, strict=True) if is_no_angle(n) and m <= 1}
-    wanted = [
-        plan_units[i]
-        if plan_units is not None
-        else base_of(unit or _usual_unit(names[i], no_angles, lengths))[0]
-        for i, unit in enumerate(said)
-    ]
+    if given == "each" and not recordings[0].named:
+        stated = [stated[i] for i in find_channels(names, joints) or range(len(joints))]
+    said = [_said_unit(recordings, columns, i, unit) for i, unit in enumerate(stated)]
     picked = [_picked(*each, joints) for each in zip(recordings, columns, strict=True)]
+    most = np.abs(np.concatenate([r.positions for r in picked])).max(axis=0)
+    no_angles = {name for group in attitudes(names) if len(group) == 4 for name in group}
+    no_angles |= {n for n, m in zip(names, most, strict=True) if is_no_angle(n) and m <= 1}
+    lengths = place_names(names)
+    usual = ["1" if n in no_angles else "m" if n in lengths else "rad" for n in names]
+    wanted = [base_of(unit or own)[0] for unit, own in zip(said, usual, strict=True)]
+    wanted = wanted if plan_units is None else list(plan_units)
     # No option may contradict a unit that the file states.
     open_ = all(r.units[i] is None for r, c in zip(recordings, columns, strict=True) for i in c)
     recorded, unclear, remarks, other = _judge_units(
@@ -168,20 +159,12 @@ def select(
     )
 
 
-def _usual_unit(name: str, no_angles: Collection[str], lengths: Collection[str]) -> str:
-    """The unit of a channel that states none."""
-    return "1" if name in no_angles else "m" if name in lengths else "rad"
-
-
 def _spread(unit: str, plan_units: Sequence[str] | None, names: Sequence[str]) -> list[str | None]:
     """One unit for all channels that can be in it, which no gripper or place is in degrees."""
     base = base_of(unit)[0]
     fits = [base_of(own)[0] == base for own in plan_units or (base,) * len(names)]
-    fits, lengths = fits if any(fits) else [True] * len(fits), place_names(names)
-    return [
-        unit if fit and not (base in TURN and (is_no_angle(name) or name in lengths)) else None
-        for fit, name in zip(fits, names, strict=True)
-    ]
+    each = zip(one_for_all(unit, names), fits, strict=True)
+    return [own if fit or not any(fits) else None for own, fit in each]
 
 
 def _guess_names(

@@ -12,12 +12,13 @@ import csv
 import math
 import re
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from functools import cached_property
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -27,6 +28,8 @@ from prior_reinforce.arm.recordings.recording import named_damage
 from prior_reinforce.arm.recordings.units import known_unit, split_unit
 from prior_reinforce.errors import FileFormatError
 
+_Column = tuple[str, str | None, list[str]]
+"""Name, unit and cells of a column."""
 Column = Float[np.ndarray, " T"]
 """Numbers of T rows."""
 DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": r"\s+"}
@@ -36,7 +39,6 @@ _SAMPLE = 40
 """Lines from which a dialect is inferred."""
 _WESTERN = set("°µ²³äöüÄÖÜßàâçéèêëîïôùûñÀÉÈáíóúãõåæøÅÆØ")
 """Non-ASCII characters in tables that a Western Excel saves in its own code page."""
-_COMMA = re.compile(r"[+-]?(0,\d{3}|\d+,(\d{1,2}|\d{4,}))")
 _LIST = re.compile(r"\s*[\[(]\s*[-+.\deE]+([,\s]+[-+.\deE]+)+\s*[\])]\s*")
 _DATE = re.compile(r"\d{4}-\d\d-\d\d|\d{1,2}:\d\d")
 _MOMENT = re.compile(
@@ -109,12 +111,11 @@ class Table:
         """Return dates or times of day from the first on, in [ns]; None where it holds others."""
         if self.is_number(column):
             return None
-        found = [_moment(cell) for cell in self.cells[column]]
-        if None in found:
-            found = [_span(cell) for cell in self.cells[column]]
-        if None in found:
-            return None
-        return np.array([time - found[0] for time in found], dtype=np.int64)  # type: ignore[operator]
+        for read in (_moment, _span):
+            found = [read(cell) for cell in self.cells[column]]
+            if None not in found:
+                return np.array([time - found[0] for time in found], dtype=np.int64)  # type: ignore[operator]
+        return None
 
     def stamps(self, column: int) -> Column:
         """Return a column as times: dates in [ns] from the first on, else its numbers."""
@@ -155,15 +156,12 @@ def _read_csv(
     blank = delimiter == DELIMITERS["space"]
     widest = max(len(line.split()) if blank else 1 + line.count(delimiter) for _, line in data)
     check_table(path, len(data), widest)
-    mark, lines = delimiter, [line for _, line in data]
-    if blank:
-        mark, lines = " ", [line.strip().replace("\t", " ") for line in lines]
-    cells = csv.reader(
-        (f"{line}\n" for line in lines), delimiter=mark, skipinitialspace=True, strict=True
-    )
+    cells = _split((f"{line}\n" for _, line in data), delimiter, strict=True)
     rows = [(data[cells.line_num - 1][0], [cell.strip() for cell in row]) for row in cells]
     above = [line for i, line in kept if i == data[0][0] - 1 and (i, line) not in data]
-    title = [c.strip() for c in _split(above[0].lstrip(" #%/"), delimiter)] if above else []
+    title = (
+        [c.strip() for c in next(_split([above[0].lstrip(" #%/")], delimiter), [])] if above else []
+    )
     return replace(_table(str(path), rows, head, decimal, title), delimiter=delimiter)
 
 
@@ -184,10 +182,11 @@ def _decoded(path: Path) -> str:
     return text
 
 
-def _split(line: str, delimiter: str) -> list[str]:
+def _split(lines: Iterable[str], delimiter: str, *, strict: bool = False) -> Any:
+    """A reader of the cells of lines (`csv.reader`)."""
     if delimiter == DELIMITERS["space"]:
-        line, delimiter = line.strip().replace("\t", " "), " "
-    return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
+        lines, delimiter = (line.strip().replace("\t", " ") + "\n" for line in lines), " "
+    return csv.reader(lines, delimiter=delimiter, skipinitialspace=True, strict=strict)
 
 
 def _dialect(lines: Sequence[str], delimiter: str | None, decimal: str | None) -> tuple[str, str]:
@@ -195,7 +194,7 @@ def _dialect(lines: Sequence[str], delimiter: str | None, decimal: str | None) -
     body = lines[min(1, len(lines) - 1) :]
 
     def score(dialect: tuple[str, str]) -> tuple[float, int]:
-        rows = [_split(line.rstrip(";,"), dialect[0]) for line in body]
+        rows: list[list[str]] = [next(_split([line.rstrip(";,")], dialect[0]), []) for line in body]
         cells = [cell for row in rows for cell in row if cell.strip()]
         numeric = sum(_is_number(cell, dialect[1]) for cell in cells) / max(len(cells), 1)
         width, often = Counter(map(len, rows)).most_common(1)[0]
@@ -275,15 +274,15 @@ def _table(
     if named and len(rows) > 1 and _are_units(rows[0][1], decimal):
         units, rows = [known_unit(c) for c in rows[0][1]], rows[1:]
     check_names(where, names)
-    columns = [[row[i] for _, row in rows] for i in range(len(names))]
-    names, units, columns = _without_lists(where, names, units, columns)
-    kept = [i for i, name in enumerate(names) if not _is_padding(name, columns[i])]
+    cells = [[row[i] for _, row in rows] for i in range(len(names))]
+    columns = _without_lists(where, list(zip(names, units, cells, strict=True)))
+    kept = [column for column in columns if not _is_padding(column[0], column[2])]
     return Table(
         where,
-        tuple(names[i] for i in kept),
+        tuple(name for name, _, _ in kept),
         named,
-        tuple(units[i] for i in kept),
-        tuple(columns[i] for i in kept),
+        tuple(unit for _, unit, _ in kept),
+        tuple(own for _, _, own in kept),
         tuple(number for number, _ in rows),
         decimal,
     )
@@ -304,12 +303,10 @@ def _of_one_width(where: str, rows: list[tuple[int, list[str]]]) -> list[tuple[i
     return [(i, row + [""] * (width - len(row))) for i, row in rows]
 
 
-def _without_lists(
-    where: str, names: list[str], units: list[str | None], columns: list[list[str]]
-) -> tuple[list[str], list[str | None], list[list[str]]]:
+def _without_lists(where: str, columns: list[_Column]) -> list[_Column]:
     """Columns of lists, `[1.0, 2.0]` in a cell, as a column for each of their numbers."""
-    parts: list[tuple[str, str | None, list[str]]] = []
-    for name, unit, column in zip(names, units, columns, strict=True):
+    parts: list[_Column] = []
+    for name, unit, column in columns:
         if not (column and all(_LIST.fullmatch(cell) for cell in column)):
             parts.append((name, unit, column))
             continue
@@ -321,10 +318,10 @@ def _without_lists(
             )
         bare, own = split_unit(name)
         parts += [
-            (f"{bare}_{i}", unit or own, [row[i] for row in rows]) for i in range(len(rows[0]))
+            (f"{bare}_{i}", unit or own, [*part]) for i, part in enumerate(zip(*rows, strict=True))
         ]
-    check_table(Path(where), len(columns[0]) if columns else 0, len(parts))
-    return [p[0] for p in parts], [p[1] for p in parts], [p[2] for p in parts]
+    check_table(Path(where), len(columns[0][2]) if columns else 0, len(parts))
+    return parts
 
 
 def _are_units(cells: list[str], decimal: str) -> bool:
@@ -335,15 +332,14 @@ def _are_units(cells: list[str], decimal: str) -> bool:
     )
 
 
+def is_unnamed(name: str) -> bool:
+    """Whether a column has no name, as pandas writes an index."""
+    return not name or name.startswith("Unnamed:")
+
+
 def _is_padding(name: str, column: Sequence[str]) -> bool:
     """Whether a column is what a trailing delimiter leaves, or the running count of pandas."""
-    numbered = name.startswith("column ")
-    unnamed = not name or name.startswith("Unnamed:") or name == "index"
-    if not (numbered or unnamed):
-        return False
-    return not any(column) or (unnamed and list(column) == [str(i) for i in range(len(column))])
-
-
-def counts(values: Column) -> bool:
-    """Whether a column counts rows or tells the time: it increases with every row."""
-    return bool(np.all(np.diff(values) > 0))
+    is_index = is_unnamed(name) or name == "index"
+    if not any(column):
+        return is_index or name.startswith("column ")
+    return is_index and list(column) == [str(i) for i in range(len(column))]

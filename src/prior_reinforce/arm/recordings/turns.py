@@ -51,15 +51,15 @@ def aligned(selection: Selection, limits: RobotLimits | None) -> tuple[Selection
     named = tuple(_unit_length(form, motions))
     form = replace(form, attitudes=(*named, *_unnamed_attitudes(form, named, motions)))
     said: list[str] = []
+    taken = {name for group in form.attitudes for name in group}
     for group in form.attitudes:
-        said += _align_attitude(selection, motions, group)
-    vectors = {name for group in form.attitudes for name in group}
+        said += _align_forms(selection, motions, group)
     for angles in euler_angles(form.names, form.units):
-        if vectors.isdisjoint(angles):
-            said += _align_euler(selection, motions, angles)
-    of_attitudes = {name for group in form.attitudes for name in group}
+        if taken.isdisjoint(angles):
+            unit = form.units[form.names.index(angles[0])]
+            said += _align_forms(selection, motions, angles, TURN[unit])
     for i, (name, unit) in enumerate(zip(form.names, form.units, strict=True)):
-        if unit in TURN and name not in of_attitudes and not is_no_angle(name):
+        if unit in TURN and name not in taken and not is_no_angle(name):
             said += _align_angle(selection, motions, i, limits)
     recordings = tuple(
         replace(recording, positions=motion)
@@ -93,96 +93,77 @@ def _unnamed_attitudes(
             if not taken.isdisjoint(group) or {*form.units[columns]} - {"rad", "1"}:
                 continue
             own = [motion[:, columns] for motion in motions]
-            starts = np.array([motion[0] for motion in own])
-            if size == 4:
-                every = np.concatenate(own)
-                found = np.ptp(every, axis=0).max() > _NEXT / 10 and np.all(
-                    np.abs(np.linalg.norm(every, axis=1) - 1) < _SAME
-                )
-            else:
-                off = starts - starts[0]
-                near, far, turned = (
-                    np.linalg.norm(each, axis=1)
-                    for each in (
-                        off,
-                        other_form(starts) - starts[0],
-                        off - TURN["rad"] * np.round(off / TURN["rad"]),
-                    )
-                )  # as angles of their own, they would lie apart though turned
-                found = bool(np.any((near > 1) & (far < np.minimum(_NEXT, turned / 2))))
-                found = found and bool(np.all(np.minimum(near, far) < 1))
-            if found:
+            if _are_unit_length(own) if size == 4 else _start_at_two_forms(own):
                 taken |= set(group)
                 yield group
 
 
-def _align_euler(
-    selection: Selection, motions: Sequence[np.ndarray], group: tuple[str, str, str]
-) -> Iterator[str]:
-    """Take the form of Euler angles that is nearest to the frame, and the episode, before."""
-    columns = [selection.names.index(name) for name in group]
-    turn, what = TURN[selection.units[columns[0]]], ", ".join(group)
-    passed, turned = list[str](), list[str]()
-    first: np.ndarray | None = None
+def _are_unit_length(motions: Sequence[np.ndarray]) -> bool:
+    """Whether four numbers that move have length 1 throughout, as quaternions do."""
+    every = np.concatenate(motions)
+    far = np.abs(np.linalg.norm(every, axis=1) - 1).max()
+    return bool(np.ptp(every, axis=0).max() > _NEXT / 10 and far < _SAME)
 
+
+def _start_at_two_forms(motions: Sequence[np.ndarray]) -> bool:
+    """Whether some motions start at one rotation vector, and the others at its other form.
+
+    Angles of their own, which lie apart though they are turned, are none.
+    """
+    starts = np.array([motion[0] for motion in motions])
+    off, other = starts - starts[0], other_form(starts) - starts[0]
+    turned = off - TURN["rad"] * np.round(off / TURN["rad"])
+    near, far, turned = (np.linalg.norm(each, axis=1) for each in (off, other, turned))
+    some = np.any((near > 1) & (far < np.minimum(_NEXT, turned / 2)))
+    return bool(some and np.all(np.minimum(near, far) < 1))
+
+
+def _align_forms(
+    selection: Selection, motions: Sequence[np.ndarray], group: Sequence[str], turn: float = 0.0
+) -> Iterator[str]:
+    """Take the form of an attitude that is nearest to the frame, and to the episode, before.
+
+    `turn` is a whole turn of Euler angles; 0 is of quaternions and rotation vectors.
+    """
+    columns, what = [selection.names.index(name) for name in group], ", ".join(group)
+    first, passed, turned = motions[0][0, columns], list[str](), list[str]()
     margin = _NEXT * turn / TURN["rad"]
 
-    def off(angles: np.ndarray, other: np.ndarray) -> np.ndarray:
-        step = angles - other
-        return np.linalg.norm(step - turn * np.round(step / turn), axis=-1)
+    def apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+        step = one - other
+        return np.linalg.norm(step - turn * np.round(step / turn) if turn else step, axis=-1)
 
     for episode, motion in zip(selection.episodes, motions, strict=True):
         own = motion[:, columns]
-        other = other_euler_angles(own, turn)
-        # Steps between others are those between own, so what counts is where the form changes.
-        changes = off(other[1:], own[:-1]) < off(own[1:], own[:-1]) - margin
-        if np.any(changes):
-            passed.append(episode)
-        is_other = np.cumsum(np.concatenate([[False], changes])) % 2 == 1
-        first = own[0] if first is None else first
-        if off(other[0], first) < off(own[0], first) - margin:
-            is_other = ~is_other
-            turned.append(episode)
-        motion[:, columns] = np.where(is_other[:, None], other, own)
-    if passed:
-        yield (
-            f"{listed(passed)}: {what} change to the other angles of the same "
-            "attitude within the motion, and are continued"
-        )
-    if turned:
-        yield f"{listed(turned)}: {what} are taken as the same attitude's other angles"
-
-
-def _align_attitude(
-    selection: Selection, motions: Sequence[np.ndarray], group: tuple[str, ...]
-) -> Iterator[str]:
-    columns = [selection.names.index(name) for name in group]
-    what, passed, turned = ", ".join(group), list[str](), list[str]()
-    first: np.ndarray | None = None
-    for episode, motion in zip(selection.episodes, motions, strict=True):
-        own = motion[:, columns]
-        kept = own.copy()
+        forms = np.stack([own, other_euler_angles(own, turn) if turn else other_form(own)])
+        which = np.zeros(len(own), dtype=int)
+        steps = apart(forms[:, None, 1:], forms[:, :-1])  # of each form now from each before
         for t in range(1, len(own)):
-            forms = (own[t], other_form(own[t]))
-            kept[t] = min(forms, key=lambda form: float(np.linalg.norm(form - kept[t - 1])))
-        if np.any(kept != own):
+            k = which[t - 1]
+            changes = steps[1 - k, k, t - 1] < steps[k, k, t - 1] - margin
+            which[t] = 1 - k if changes else k
+        if np.any(which):
             passed.append(episode)
-        first = kept[0] if first is None else first
-        near, far = (float(np.linalg.norm(form - first)) for form in (kept[0], other_form(kept[0])))
-        if far < near:
-            kept = other_form(kept)
+        near, far = apart(forms[:, 0], first)
+        if far < near - margin:
+            which = 1 - which
             turned.append(episode)
-        if abs(far - near) < _NEXT and max(far, near) > 1:
+        if not turn and abs(far - near) < _NEXT and max(far, near) > 1:
             raise InvalidDemonstrationsError(
                 f"episode {episode} starts half a turn from {selection.episodes[0]} in {what}: "
                 "which way lies between them cannot be told; leave one out (--leave-out)"
             )
-        motion[:, columns] = kept
-    if passed:
-        yield f"{listed(passed)}: {what} change their sign within the motion, which is one attitude"
-    if turned:
-        other = "sign" if len(group) == 4 else "numbers of the same turn"
-        yield f"{listed(turned)}: {what} have the other {other}, and are taken as the same attitude"
+        motion[:, columns] = forms[which, np.arange(len(own))]
+    other = "sign" if len(group) == 4 else "numbers of the same turn"
+    changed = "change their sign within the motion, which is one attitude"
+    taken = f"have the other {other}, and are taken as the same attitude"
+    if turn:
+        other = "other angles of the same attitude"
+        changed = f"change to the {other} within the motion, and are continued"
+        taken = "are taken as the same attitude's other angles"
+    for episodes, says in ((passed, changed), (turned, taken)):
+        if episodes:
+            yield f"{listed(episodes)}: {what} {says}"
 
 
 def _align_angle(
@@ -224,9 +205,10 @@ def _align_angle(
 
 def _range(name: str, limits: RobotLimits | None) -> tuple[float, float]:
     """Where a channel may be; anywhere if it is no joint of the robot."""
-    for i, joint in enumerate(() if limits is None else limits.joint_names):
-        if limits is not None and is_joint(name, joint):
-            return float(limits.lower[i]), float(limits.upper[i])
+    if limits is not None:
+        for joint, low, high in zip(limits.joint_names, limits.lower, limits.upper, strict=True):
+            if is_joint(name, joint):
+                return float(low), float(high)
     return -np.inf, np.inf
 
 

@@ -11,8 +11,8 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from prior_reinforce.errors import ConfigurationError, UnclearUnitsError
-from prior_reinforce.plans.whole_turns import attitudes
-from prior_reinforce.units import STATED, UNITS, factor, spelt, units_of
+from prior_reinforce.plans.whole_turns import TURN, attitudes
+from prior_reinforce.units import STATED, UNITS, base_of, factor, spelt, units_of
 
 SECONDS = units_of("time")
 """Units of time, in [s]."""
@@ -100,6 +100,12 @@ def place_names(names: Sequence[str]) -> set[str]:
         ):
             groups.setdefault(match["stem"], {})[match["axis"].lower()] = name
     return {name for group in groups.values() if len(group) > 1 for name in group.values()}
+
+
+def one_for_all(unit: str, names: Sequence[str]) -> list[str | None]:
+    """Return one unit for each channel that can be in it; grippers and places are no angles."""
+    is_angle, lengths = base_of(unit)[0] in TURN, place_names(names)
+    return [None if is_angle and (is_no_angle(n) or n in lengths) else unit for n in names]
 
 
 def split_unit(column: str, among: Collection[str] | None = None) -> tuple[str, str | None]:

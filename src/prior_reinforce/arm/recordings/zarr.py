@@ -21,11 +21,7 @@ from prior_reinforce.arm.recordings.beside import may_move, recorded_among, word
 from prior_reinforce.arm.recordings.bounds import check_bytes, check_chunks, check_numbers
 from prior_reinforce.arm.recordings.clock import Stamps
 from prior_reinforce.arm.recordings.options import ReadOptions
-from prior_reinforce.arm.recordings.recording import (
-    Episodes,
-    Recording,
-    named_damage,
-)
+from prior_reinforce.arm.recordings.recording import Episodes, Recording, named_damage
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import require_inside
 
