@@ -197,8 +197,14 @@ def _rates(key: str, turning: Sequence[Joint]) -> PerJoint | None:
     values = [joint.number("limit", key) for joint in turning]
     said = [value for value in values if value is not None]
     if said and len(said) < len(values):
+        others = ", ".join(
+            f"{joint.name} ({value:g})"
+            for joint, value in zip(turning, values, strict=True)
+            if value is not None
+        )
         raise turning[values.index(None)].error(
-            f"states no {key} in its <limit>, as others do; write it there, or take theirs out"
+            f"states no {key} in its <limit>, but others do: {others}; write it there, or take the "
+            f"attribute {key} out of theirs"
         )
     for joint, value in zip(turning, said, strict=False):
         if not 0 < value <= RATES[key]:
