@@ -25,9 +25,11 @@ from prior_reinforce.errors import (
     ConfigurationError,
     InvalidFeedbackError,
     InvalidGoalError,
+    OutOfReachError,
     TrialStateError,
     WorkspaceError,
 )
+from prior_reinforce.simulation.tasks import make_task
 from tests.arm.executing import toy_arm
 from tests.arm.workspace.planar import events_in, stage_in
 
@@ -163,6 +165,25 @@ def test_after_a_goal_that_was_set_by_a_session_in_python_another_is_set(verbs):
     assert state.goals[0].adapter == DEFAULT_ADAPTER
     verbs.goal(SetGoal(seen=state.id, goal=[0.9, 0.1]))
     assert verbs.workspace.state.goals[-1].adapter == DEFAULT_ADAPTER
+
+
+def test_before_a_goal_is_touched_those_within_reach_are_told(verbs, tmp_path):
+    nothing_moves = verbs.reach()
+    assert (nothing_moves.goals, nothing_moves.refused) == ([], [])
+    hoop = tmp_path / "hoop"
+    with Workspace.create(hoop, symmetry="carried", box=(-0.8, -0.9, 0.4, 0.6, 0.9, 1.4)) as made:
+        shown = make_task("basketball-v1").demonstrations("A").only([0]).without_symmetry()
+        made.import_demonstrations(shown, "a throw")
+        unlearned = Verbs(hoop)
+        assert unlearned.reach().goals == []
+        unlearned.close()
+        made.learn()
+    console = Verbs(hoop)
+    region = console.reach()
+    with pytest.raises(OutOfReachError):
+        console.goal(SetGoal(seen=console.state().id, goal=region.refused[0]))
+    assert console.goal(SetGoal(seen=console.state().id, goal=region.goals[0])).step == "ask"
+    console.close()
 
 
 def test_without_an_executor_the_plan_is_downloaded(verbs):

@@ -129,7 +129,19 @@ function take(state) {
   if (!trial) motion = null;
   else if (!motion || motion.sha256 !== trial.sha256) fetchMotion(trial.number);
   if (S.step === "execute" && S.moved_by === "command" && !L.question) askToMove("trial");
+  if (mapped() && touching() === "goal" && S.model !== reach.of) fetchReach();
   draw();
+}
+
+// Which goals can be reached; tried once a model, when a goal is to be touched.
+let reach = { of: null, goals: [], refused: [] };
+async function fetchReach() {
+  const of = S.model;
+  reach = { of, goals: [], refused: [] };
+  const answer = await get("/api/reach");
+  if (!answer || of !== reach.of) return;
+  reach = { of, ...await answer.json() };
+  drawNews();
 }
 
 async function fetchMotion(number) {
@@ -401,6 +413,16 @@ function drawMap() {
     parts.push(g("line", { class: v ? "grid" : "grid axis", x1: view.x, x2: view.x + view.w, y1: v, y2: v }));
     parts.push(g("text", { class: "ruler", x: view.x + 4 * px, y: v - 4 * px, size: 12 * px }, `${-v / 10} cm`));
   }
+  if (touching() === "goal") {
+    for (const place of reach.goals) {
+      const [u, v] = uv(xy(place));
+      parts.push(g("circle", { class: "reach", cx: u, cy: v, r: 5 * px }));
+    }
+    for (const place of reach.refused) {
+      const [u, v] = uv(xy(place));
+      parts.push(g("path", { class: "reach", d: `M${u - 4 * px} ${v - 4 * px}l${8 * px} ${8 * px}m0 ${-8 * px}l${-8 * px} ${8 * px}` }));
+    }
+  }
   for (const { outcome, name } of shownDemonstrations()) {
     const [u, v] = uv(xy(outcome));
     parts.push(g("rect", { class: "demo", x: u - 6 * px, y: v - 6 * px, width: 12 * px, height: 12 * px }));
@@ -514,6 +536,7 @@ function drawRuler(ruler) {
 function drawBar() {
   const waiting = openTrial();
   const legend = S.shown.length ? ["☐ demonstrations"] : [];
+  if (touching() === "goal" && reach.goals.length) legend.push("○ within the arm's reach, × not");
   if (S.goals.length) legend.push("✛ goal, its tolerance around it");
   if (S.trials.some((trial) => trial.outcome && trial.goal === S.goals.length)) legend.push("● trials by number, green where they hit");
   if (waiting && waiting.stage !== "executed") legend.push("dashed: where the next plan aims");

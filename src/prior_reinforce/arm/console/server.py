@@ -98,6 +98,7 @@ def endpoints(verbs: Verbs, imports: Imports, pictures: Pictures) -> list[Endpoi
     return [
         *(Endpoint("POST", f"/api/{call.__name__}", call) for call in posted),
         Endpoint("GET", "/api/state", verbs.state),
+        Endpoint("GET", "/api/reach", verbs.reach),
         Endpoint("GET", _PLAN, verbs.motion),
         Endpoint("GET", f"{_PLAN}/file", verbs.plan_file),
         Endpoint("GET", _RECORDINGS, imports.look),

@@ -33,6 +33,7 @@ from prior_reinforce.arm.workspace.execute import (
     recover,
     say_look,
 )
+from prior_reinforce.arm.workspace.reaching import region_of
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.errors import PriorReinforceError, TrialStateError, WorkspaceError
 from prior_reinforce.generators.base import FitProgress
@@ -98,6 +99,15 @@ class Question(Struct):
     """See `is_fast`."""
     refused: str = ""
     """Why the arm refuses the plan; empty if it does not."""
+
+
+class Reached(Struct):
+    """Goals to which motions may be moved."""
+
+    goals: list[list[float]]
+    """Those within the arm's limits."""
+    refused: list[list[float]]
+    """The others."""
 
 
 class Measured(Struct, forbid_unknown_fields=True):
@@ -287,6 +297,17 @@ class Verbs:
             self._learning = (0.0, 0.0)
             threading.Thread(target=self._learn, name="learning", daemon=True).start()
         return self.state()
+
+    def reach(self) -> Reached:
+        """Return which goals can be reached with the model in use; none where nothing is moved."""
+        with Workspace(self.folder) as workspace:  # some hundred plans are made for it
+            trained = workspace.state.training is not None and not workspace.state.stale
+            region = region_of(workspace) if trained else None
+        if region is None:
+            return Reached([], [])
+        return Reached(
+            region.goals[region.reached].tolist(), region.goals[~region.reached].tolist()
+        )
 
     def motion(self, number: int) -> MotionView:
         """Return a trial's plan, to be played."""
