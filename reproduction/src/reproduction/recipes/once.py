@@ -46,7 +46,7 @@ _GOALS, _GOALS_BESIDE = 4, 2
 """Goals a training: of ours by eye and of copies, and of all else."""
 _OUTSIDE = (0.1, 0.2)
 """How far outside the region goals are tried, [m]."""
-_SHOWN = {"basketball-v1": 6, "curling": 6, "fishing": 8}
+SHOWN = {"basketball-v1": 6, "curling": 6, "fishing": 8}
 """Demonstrations in a set; of the zoo's, eight."""
 ZOO = tuple(name for name in (*DEVELOPED_ON, *REPORTED) if make_task(name).symmetry is not None)
 """Tasks of the zoo that state a symmetry."""
@@ -196,7 +196,7 @@ def _subsets(method: Method, task: str, name: str, count: int) -> int:
 
 
 def _shown(task: str) -> int:
-    return _SHOWN.get(TASKS.get(task, task), 8)
+    return SHOWN.get(TASKS.get(task, task), 8)
 
 
 def _trials(scale: Scale, method: Method, task: str, name: str, count: int, number: int) -> Trials:
