@@ -109,3 +109,31 @@ def test_an_outcome_on_the_axis_has_no_sign_to_lose():
     outcomes = np.array(shown.outcomes_seen)
     outcomes[2, 1] = 0.0
     slips(replace(shown, outcomes_seen=outcomes), named(shown.n))
+
+
+@pytest.mark.filterwarnings("ignore:an outcome of")
+def test_a_forgotten_first_outcome_is_told_although_a_strangers_fills_the_last_row():
+    shown = plain(np.random.default_rng(3).uniform(-1, 1, (8, 2)))
+    outcomes = np.vstack([shown.outcomes_seen[1:], [[1.02, -0.11]]])
+    (slip,) = slips(replace(shown, outcomes_seen=outcomes), named(8))
+    assert slip.what == "outcomes from throw_0 on may stand one row too high"
+
+
+def test_two_signs_that_were_lost_are_named():
+    shown = plain(np.random.default_rng(11).uniform(-1, 1, (10, 2)))
+    outcomes = np.array(shown.outcomes_seen)
+    lost = tuple(np.flatnonzero(outcomes[:, 1] < -0.06)[:2].tolist())
+    outcomes[list(lost), 1] *= -1
+    (slip,) = slips(replace(shown, outcomes_seen=outcomes), named(10))
+    assert slip.rows == lost
+    assert "may have lost their signs" in slip.what
+
+
+@pytest.mark.filterwarnings("ignore:an outcome of")
+def test_a_number_that_is_too_small_is_said_to_be_and_its_row_to_be_looked_at():
+    shown = plain(np.random.default_rng(5).uniform(-1, 1, (8, 2)))
+    outcomes = np.array(shown.outcomes_seen)
+    outcomes[3] /= 10
+    (slip,) = slips(replace(shown, outcomes_seen=outcomes), named(8))
+    assert slip.rows == (3,)
+    assert "may be 10 times too small; look at the other numbers of its row" in slip.what

@@ -305,3 +305,45 @@ def test_a_motion_that_comes_twice_is_refused(originals, tmp_path):
     said = "demonstration 0 so far and new one 0 are one motion"
     with pytest.raises(InvalidDemonstrationsError, match=said):
         appended(kept, other)
+
+
+def _day(tmp_path, parts, gap=0.0):
+    """One file of joint positions at 100 Hz, and six outcomes that are numbered."""
+    now, rows = 0.0, ["time,q1,q2"]
+    for begin, end in parts:
+        s = np.clip((np.arange(180) / 100 - 0.4) / 1.0, 0, 1)
+        for k, x in enumerate(10 * s**3 - 15 * s**4 + 6 * s**5):
+            q = np.array(begin) + x * (np.array(end) - begin)
+            rows.append(f"{now + k / 100:.3f},{q[0]:.5f},{q[1]:.5f}")
+        now += 1.8 + gap
+    (tmp_path / "log.csv").write_text("\n".join(rows))
+    outcomes = [f"{i},{0.8 + 0.05 * i:.2f},{0.1 * (-1) ** i:.1f}" for i in range(6)]
+    (tmp_path / "outcomes.csv").write_text("\n".join(["episode,x,y", *outcomes]))
+    return tmp_path / "log.csv"
+
+
+ENDS = [(0.6 + 0.05 * i, -0.4 + 0.03 * (i % 3)) for i in range(6)]
+
+
+def test_ways_back_between_throws_are_named_and_outcomes_are_taken_as_they_come(tmp_path):
+    start = (0.1, 0.2)
+    parts = [pair for end in ENDS for pair in ((start, end), (end, start))]
+    path, back = _day(tmp_path, parts), [f"log-{i}" for i in range(1, 12, 2)]
+    with pytest.raises(InvalidDemonstrationsError, match=f"--leave-out {' '.join(back)}"):
+        import_demonstrations(path, rests=0.5)
+    taken = import_demonstrations(path, rests=0.5, leave_out=back).demonstrations
+    np.testing.assert_allclose(taken.plans[:, -1], ENDS, atol=1e-3)
+    np.testing.assert_allclose(taken.outcomes_seen[:, 0], 0.8 + 0.05 * np.arange(6))
+
+
+def test_a_recorder_that_pauses_with_the_arm_is_cut_where_it_pauses(tmp_path):
+    path = _day(tmp_path, [((0.1, 0.2), end) for end in ENDS], gap=8.0)
+    text = "\n".join(  # without the rests before and after
+        line
+        for i, line in enumerate(path.read_text().splitlines())
+        if i == 0 or 30 <= (i - 1) % 180 < 150
+    )
+    path.write_text(text)
+    taken = import_demonstrations(path, rests=0.5).demonstrations
+    np.testing.assert_allclose(taken.plans[:, -1], ENDS, atol=1e-3)
+    np.testing.assert_allclose(taken.plans[:, 0], [(0.1, 0.2)] * 6, atol=1e-3)

@@ -382,3 +382,26 @@ def test_a_column_may_end_in_inches_where_the_task_has_that_name(tmp_path):
     np.testing.assert_allclose(found.values, [[0.254], [0.3048]])
     assert found.units == ("m",)
     assert read_outcomes(tmp_path / "outcomes.csv").names == ("distance_in", "plug_in")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("episode,x,y\n0,80.0 cm,10 cm\n", r"write 80.0, and the unit in the head: x \[cm\]"),
+        (
+            "episode,x,y,sd_x,sd_y\n0,0.8,0.1,0.01,0.02\n",
+            "uncertainties in sd_x, sd_y, .*column sd",
+        ),
+    ],
+)
+def test_what_is_written_otherwise_is_told_with_what_to_write(recording, tmp_path, text, says):
+    with pytest.raises(FileFormatError, match=says):
+        read_outcomes(table(tmp_path, text), ["x", "y"])
+
+
+def test_a_unit_that_one_component_looks_like_is_not_proposed_for_all(recording, tmp_path):
+    """Metres ahead and centimetres aside: were all in cm, x would be 8 mm."""
+    rows = [f"{name},{x},{100 * y}" for name, (x, y) in OUTCOMES.items()]
+    path = table(tmp_path, "\n".join(["episode,x,y", *rows]))
+    with pytest.raises(InvalidDemonstrationsError, match=r"the head, .* x \[m\], y \[cm\]"):
+        import_demonstrations(recording, outcomes=path)

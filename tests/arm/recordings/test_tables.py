@@ -178,3 +178,25 @@ def test_what_is_no_date_is_no_time(tmp_path, second):
     path = tmp_path / "a.csv"
     path.write_text(f"t,a\n2026-11-21T10:00,0\n{second},1\n")
     assert one(path).nanoseconds(0) is None
+
+
+@pytest.mark.parametrize("mark", ["'", "’", " ", "\u00a0", "\u202f"])
+def test_marks_between_thousands_that_no_decimal_sign_is_are_passed_over(tmp_path, mark):
+    path = tmp_path / "a.csv"
+    path.write_text(f"episode;x;y\n0;1{mark}012,5;-250,0\n1;980,0;12{mark}345{mark}678\n")
+    table = read_table(path)
+    assert [table.numbers(i).tolist() for i in (1, 2)] == [[1012.5, 980.0], [-250.0, 12345678.0]]
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("11/26/2026 12:59:59.900 PM", "11/26/2026 1:00:00.150 PM"),
+        ("26.11.2026 23:59:59,900", "27.11.2026 00:00:00,150"),
+        ("11:59:59.900 AM", "12:00:00.150 PM"),
+    ],
+)
+def test_times_as_office_programs_write_them(tmp_path, before, after):
+    path = tmp_path / "a.csv"
+    path.write_text(f"time;q1\n{before};0.5\n{after};0.75\n")
+    assert read_table(path).stamps(0).tolist() == [0.0, 250e6]

@@ -335,10 +335,27 @@ REFUSED = [
         says="joint3_link', which is no link",
     ),
     Urdf(
+        "a second arm of which nobody said which is meant",
+        [
+            fixed("b", "torso"),
+            *side("left"),
+            fixed("lt", "tool0"),
+            *side("right"),
+            fixed("rt", "right_tool0"),
+        ],
+        says="which end in tool0 and right_tool0; say whose",
+    ),
+    Urdf(
+        "a palletizer, whose tool is kept level",
+        [*arm(SIX[:3]), J("level", "level_link", more='<mimic joint="joint3"/>'), *arm(["joint5"])],
+        {"hold": "level=0"},
+        says="joint level follows joint3 (<mimic>), and does not stand still",
+    ),
+    Urdf(
         "parallel linkage",
         [*arm(SIX[:2]), J("p", "p_link", more='<mimic joint="joint2"/>')],
         {"tip": "p_link"},
-        says="joint p follows another",
+        says="joint p follows another (<mimic> of joint2)",
     ),
     Urdf("MuJoCo's format", arm(SIX), change=("robot", "mujoco"), says="begins with <mujoco>"),
     Urdf("a gripper alone", fingers("base_link", "revolute"), says="--tip"),

@@ -63,10 +63,15 @@ def slips(demonstrations: Demonstrations, episodes: tuple[str, ...]) -> list[Sli
     now = _error(hats, outcomes)
     found = []
     for rows, what, other, least in _candidates(demonstrations, episodes, directions):
-        columns = np.any(other != outcomes, axis=0)
-        if not columns.any():
+        known = np.isfinite(other).all(axis=1)
+        hats_of, was, other = hats, now, other[known]
+        if not known.all():  # the row of another throw is no part of what is compared
+            hats_of = _hats(directions[known], other.shape[1])
+            was = _error(hats_of, outcomes[known]) if hats_of else now
+        columns = np.any(other != outcomes[known], axis=0)
+        if not hats_of or not columns.any():
             continue  # that order is this one
-        before, after = float(np.max(now[columns])), float(np.max(_error(hats, other)[columns]))
+        before, after = float(np.max(was[columns])), float(np.max(_error(hats_of, other)[columns]))
         better = before / max(after, 1e-12)
         told = better > least and after < _TELLING and before > _DOUBTFUL
         if least == _CERTAIN:
@@ -120,8 +125,11 @@ def _candidates(
     episodes: tuple[str, ...],
     directions: Float[np.ndarray, "N D"],
 ) -> Iterator[tuple[tuple[int, ...], str, Points, float]]:
-    """Rows, what slip it is, the outcomes without it, and how much better they must be."""
-    outcomes, n = demonstrations.outcomes_seen, demonstrations.n
+    """Rows, what slip it is, the outcomes without it, and how much better they must be.
+
+    A row of nan is one whose outcome is not in the table.
+    """
+    (n, k), outcomes = demonstrations.outcomes_seen.shape, demonstrations.outcomes_seen
     names = demonstrations.outcome_format.names
     every = tuple(range(n))
     for i, j in combinations(every, 2):
@@ -145,8 +153,10 @@ def _candidates(
             other[:, c] *= signs
             yield every, f"all of {name} may have lost their signs", other, _SIGNS_BETTER
     for start, by in [(s, b) for s in range(n - 3) for b in (1, -1)]:
-        other = outcomes.copy()
-        other[start:] = np.roll(outcomes[start:], by, axis=0)
+        other = np.full_like(outcomes, np.nan)  # where a row is missing
+        other[:start] = outcomes[:start]
+        there, here = (n - 1, start + 1) if by > 0 else (n, start)
+        other[here : here + n - 1 - start] = outcomes[there - (n - 1 - start) : there]
         where = "high" if by > 0 else "low"
         what = f"outcomes from {episodes[start]} on may stand one row too {where}"
         yield every[start:], what, other, _SHIFT_BETTER
@@ -154,7 +164,14 @@ def _candidates(
         for c, name in enumerate(names):
             if not outcomes[i, c]:
                 continue  # zero has neither sign nor decimal point
-            points = ((f, f"be {1 / f:g} times too large", _POINT_BETTER) for f in _FACTORS)
+            points = (
+                (
+                    f,
+                    f"be {max(f, 1 / f):g} times too {'small' if f > 1 else 'large'}",
+                    _POINT_BETTER,
+                )
+                for f in _FACTORS
+            )
             changes = ((-1.0, "have lost its sign", _SIGN_BETTER), *points)
             for factor, says, least in changes:
                 other = outcomes.copy()
@@ -168,4 +185,12 @@ def _candidates(
                 if abs(other[i, c] - middle) > room or (factor > 0 and off <= half):
                     continue  # it does not stand out, or would not stand among the others
                 value = f"{name} of {episodes[i]}, {outcomes[i, c]:.4g}, may {says}"
-                yield (i,), value, other, least
+                also = "; look at the other numbers of its row as well" * (factor > 0 and k > 1)
+                yield (i,), value + also, other, least
+    for c, name in enumerate(names):
+        for i, j in combinations(every if n > _FEWEST else (), 2):
+            other = outcomes.copy()
+            other[[i, j], c] *= -1.0
+            if np.ptp(np.sign(outcomes[:, c])) > 1 and outcomes[i, c] * outcomes[j, c] > 0:
+                what = f"{name} of {episodes[i]} and {episodes[j]} may have lost their signs"
+                yield (i, j), what, other, _SIGNS_BETTER

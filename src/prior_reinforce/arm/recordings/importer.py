@@ -11,8 +11,11 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from prior_reinforce.arm.recordings import csv, hdf5, lerobot, npz, ros, zarr
 from prior_reinforce.arm.recordings.bounds import check_numbers
@@ -43,6 +46,8 @@ from prior_reinforce.wording import as_html
 _REST, _MOST_MOTIONS = 0.5, 3
 """Rest in [s] after which another throw may begin, and motions of one throw: there and back, with a
 pause. Ours."""
+_BACK = 0.1
+"""Part of its range that a joint may be off where a motion goes back to another's start (ours)."""
 
 
 @dataclass(frozen=True)
@@ -203,6 +208,13 @@ def read_recordings(
     return list(recordings.episodes)
 
 
+def _goes_back(before: Recording, motion: Recording) -> bool:
+    """Whether a motion ends where the one before it began."""
+    both = np.vstack([before.positions, motion.positions])
+    far = np.abs(motion.positions[-1] - before.positions[0])
+    return bool(np.all(far <= _BACK * np.maximum(np.ptp(both, axis=0), 1e-12)))
+
+
 @dataclass(frozen=True, eq=False)
 class Recordings:
     """The episodes of a source, read once: to be inspected, and turned into demonstrations."""
@@ -280,7 +292,7 @@ class Recordings:
         places = self.outcome_places
         path = Path(given) if given is not None else table_beside(places)
         if path is not None:
-            found = read_outcomes(path, names)
+            found = self._in_order(read_outcomes(path, names))
             return found if names is None else found.only(names)
         own = {r.episode: r.outcome.tolist() for r in self.episodes if r.outcome is not None}
         if own:
@@ -292,6 +304,30 @@ class Recordings:
             "recording format says where the object landed; write "
             f"{places[0] / OUTCOMES_FILE} with the columns episode,x,y (import --inspect writes "
             f"one to fill in), or name a table with --outcomes{hint if above else ''}"
+        )
+
+    def _in_order(self, found: Outcomes) -> Outcomes:
+        """Match outcomes of motions that one file was cut into: by name, or as they come.
+
+        Raises:
+            InvalidDemonstrationsError: They are not as many, and name none of the motions.
+        """
+        motions = [recording.episode for recording in self.episodes]
+        if not self.options.rests or not {*motions}.isdisjoint(found.episodes):
+            return found
+        if len(motions) == len(found.episodes):
+            return replace(found, episodes=tuple(motions))
+        back: list[str] = []
+        for before, motion in pairwise(self.episodes):
+            if before.episode not in back and _goes_back(before, motion):
+                back.append(motion.episode)
+        remedy = "or cut at longer or shorter rests (--rests)"
+        if back:
+            remedy = f"{listed(back)} go back to where the motion before began: if those are no "
+            remedy += f"throws, --leave-out {' '.join(back)}"
+        raise InvalidDemonstrationsError(
+            f"{self.source} was cut into {len(motions)} motions, and {found.where} has "
+            f"{len(found.episodes)} outcomes: name each outcome's motion ({motions[0]}); {remedy}"
         )
 
     def demonstrations(

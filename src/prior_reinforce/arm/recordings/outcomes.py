@@ -41,10 +41,15 @@ SD = "sd"
 """Column of the standard deviation of a row's components."""
 _HUNDREDS = re.compile(r"[+-]?[1-9]\d\d+")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}([.,]\d{3})+")
+_WITH_UNIT = re.compile(r"([-+\d.,]+) *([^\d\s.,]+)")
+"""A number and its unit in one cell."""
+_UNCERTAINTY = re.compile(r"(.*[^a-z])?(sd|std|stdev|sigma|stderr|uncertainty)([^a-z].*)?|.*±.*")
 _SEMICOLONS = "semicolons, where a comma is the decimal sign"
 _FAR, _FEW = 10.0, 3
 """Times as far as all others that an outcome is in another unit, and outcomes of which it is not
 yet known how far they lie apart. Ours."""
+_AT_THE_BASE = 0.2
+"""So near the base, in [m], nothing is thrown or pushed (ours)."""
 SOURCE = "source"
 _NOT_COMPONENTS = (SD, SOURCE, "note", "notes", "comment", "comments")
 
@@ -163,6 +168,16 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
     if names is not None and set(names) <= {split[i][0] for i in columns}:
         columns = [i for i in columns if split[i][0] in names]
     kept = [split[i][0] for i in columns]
+    spreads = [
+        name
+        for i, name in enumerate(lower)
+        if name != SD and kept and i not in columns and _UNCERTAINTY.fullmatch(name)
+    ]
+    if spreads:
+        raise FileFormatError(
+            f"{path} says uncertainties in {', '.join(spreads)}, but a row has one, in a column "
+            f"{SD}: write the largest of each row there, and take the others out"
+        )
     if key is None or not columns or len(set(kept)) != len(kept):
         raise FileFormatError(
             f"{path} begins with {','.join(table.names)!r:.200}, expected column names such as "
@@ -219,10 +234,13 @@ def _doubt_thousands(path: Path, table: Table, columns: Mapping[int, str | None]
 def _finite(path: Path, table: Table, row: int, column: int) -> float:
     value = float(table.values[row, column])
     if not math.isfinite(value):
+        name, cell = table.names[column], table.cells[column][row][:40]
+        remedy = "measure that outcome, or empty the whole row's numbers"
+        if (said := _WITH_UNIT.fullmatch(cell)) and (unit := known_unit(said[2])):
+            remedy = f"write {said[1]}, and the unit in the head: {name} [{unit}]"
         raise FileFormatError(
-            f"{path}, line {table.lines[row]}: {table.names[column]} is "
-            f"{table.cells[column][row][:40]!r}, expected a finite number; measure that outcome, "
-            "or empty the whole row's numbers"
+            f"{path}, line {table.lines[row]}: {name} is {cell!r}, expected a finite number; "
+            f"{remedy}"
         )
     return value
 
@@ -279,6 +297,8 @@ def in_units(
             unclear.setdefault(recorded, []).append(f"{name} reaches {largest:.4g}")
         elif own is not None and given != unit and looks != unit:
             unclear.setdefault(unit, []).append(f"{name} reaches {most:.4g} {unit} ({rename})")
+    for unit in unclear:
+        _refuse_one_unit(outcomes, wanted, unit)
     inches = " (or inches: --outcome-unit in)"
     ambiguities = tuple(
         Ambiguity(
@@ -300,6 +320,34 @@ def in_units(
             f"{SD} [{first}] if that is right"
         )
     return converted, ambiguities
+
+
+def _refuse_one_unit(outcomes: Outcomes, wanted: Sequence[str], unit: str) -> None:
+    """Refuse components in several units: were all in one, the object would lie at the base.
+
+    InvalidDemonstrationsError says what to write in the head.
+    """
+    unsaid = [j for j, own in enumerate(outcomes.units) if own is None]
+    same = [base_of(known_unit(wanted[j]) or wanted[j])[0] == base_of(unit)[0] for j in unsaid]
+    if base_of(unit)[0] != "m" or len(unsaid) < 2 or not all(same):
+        return
+    values = np.abs(outcomes.values[:, unsaid])
+    far = np.nanmax(values, axis=0)
+    heads = [
+        f"{outcomes.names[j]} [{unit if judge_unit(wanted[j], most) == unit else wanted[j]}]"
+        for j, most in zip(unsaid, far, strict=True)
+    ]
+    plain = [
+        most for j, most in zip(unsaid, far, strict=True) if judge_unit(wanted[j], most) != unit
+    ]
+    together = np.nanmax(np.hypot.reduce(values, axis=1)) * base_of(unit)[1]
+    if together < _AT_THE_BASE < max(plain, default=0.0):
+        raise InvalidDemonstrationsError(
+            f"in {outcomes.where}, {outcomes.names[unsaid[int(np.argmax(far))]]} reaches "
+            f"{far.max():.4g}, as in {unit}, but were all in {unit}, the object would lie within "
+            f"{100 * _AT_THE_BASE:g} cm of the base; say each one's unit in the head, for instance "
+            f"{', '.join(heads)}"
+        )
 
 
 def _refuse_odd_row(outcomes: Outcomes, units: Sequence[str]) -> None:

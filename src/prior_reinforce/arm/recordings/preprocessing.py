@@ -162,25 +162,33 @@ def preprocess(
 
 
 def at_rests(recording: Recording, rest: float) -> list[Recording]:
-    """Cut a recording wherever nothing moves for `rest` in [s], into `NAME-0`, `NAME-1`, ..."""
+    """Cut a recording wherever nothing moves for `rest` in [s], into `NAME-0`, `NAME-1`, ...
+
+    While nothing is recorded, nothing moves: some recorders pause with the arm.
+    """
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-    q, size = recording.positions, max(2, math.ceil(rest / recording.period))
+    times, size = recording.times, max(2, math.ceil(rest / recording.period))
+    frames = np.rint(np.append(np.diff(times), 0.0) / recording.period)
+    frame = np.repeat(np.arange(len(times)), np.clip(frames, 1, 2 * size).astype(int))
+    q = recording.positions[frame]
     if len(q) <= size:
         return [recording]
-    band = analyse([q], [unit or "rad" for unit in recording.units], recording.period).trim_band
+    units = [unit or "rad" for unit in recording.units]
+    band = analyse([recording.positions], units, recording.period).trim_band
     spread = maximum_filter1d(q, size, axis=0) - minimum_filter1d(q, size, axis=0)
     still = np.all(spread[size // 2 : len(q) - (size - 1) // 2] <= band, axis=1)
     covered = np.cumsum(np.append(still, np.zeros(size)) - np.append(np.zeros(size), still))
     moves = (covered[: len(q)] == 0).astype(int)
     begins, ends = (np.flatnonzero(np.diff(moves, prepend=0, append=0) == sign) for sign in (1, -1))
-    cuts = [0, *((begins[1:] + ends[:-1]) // 2).tolist(), len(q)]
+    middles = (begins[1:] + ends[:-1]) // 2
+    cuts = [0, *(frame[middles] + (frame[middles] == frame[middles - 1])).tolist(), len(times)]
     return [
         replace(
             recording,
             episode=f"{recording.episode}-{i}",
             times=recording.times[a:b],
-            positions=q[a:b],
+            positions=recording.positions[a:b],
         )
         for i, (a, b) in enumerate(pairwise(cuts))
     ]

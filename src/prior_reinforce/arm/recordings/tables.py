@@ -40,12 +40,18 @@ _SAMPLE = 40
 _WESTERN = set("°µ²³äöüÄÖÜßàâçéèêëîïôùûñÀÉÈáíóúãõåæøÅÆØ")
 """Non-ASCII characters in tables that a Western Excel saves in its own code page."""
 _LIST = re.compile(r"\s*[\[(]\s*[-+.\deE]+([,\s]+[-+.\deE]+)+\s*[\])]\s*")
-_DATE = re.compile(r"\d{4}-\d\d-\d\d|\d{1,2}:\d\d")
+_DATE = re.compile(r"\d{4}-\d\d-\d\d|\d{1,2}:\d\d|\d{1,2}[/.]\d{1,2}[/.]\d{4}")
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}([ '’\u00a0\u202f])\d{3}(\1\d{3})*([.,]\d*)?")
+"""Numbers whose thousands are apart by a mark that no decimal sign is: `1'012.5`, `1 012,5`."""
 _MOMENT = re.compile(
     r"(\d{4})-?(\d\d)-?(\d\d)(?:[T ](\d\d):?(\d\d)(?::?(\d\d)(?:[.,](\d{1,9})\d*)?)?)?"
     r" ?(?:Z|UTC|([+-]\d\d):?(\d\d)?)?"
 )
 """ISO 8601."""
+_OF_AN_OFFICE = re.compile(
+    r"(?:(\d{1,2})[/.](\d{1,2})[/.](\d{4}),? +)?(\d{1,2}):(\d\d):(\d\d)([.,]\d+)? ?([AP]M)?", re.I
+)
+"""`11/26/2026 1:05:09.3 PM`, `26.11.2026 13:05:09`: as office programs write them."""
 _SPAN = re.compile(r"([+-]?)(?:(\d+) days? \+?)?(\d+):([0-5]\d):([0-5]\d)(?:[.,](\d{1,9})\d*)?")
 _SECOND_ROW_OF_UNITS = re.compile(r"[\[(]?[A-Za-zµμ°/^*·0-9.%-]{0,12}[\])]?")
 
@@ -112,7 +118,7 @@ class Table:
         if self.is_number(column):
             return None
         for read in (_moment, _span):
-            found = [read(cell) for cell in self.cells[column]]
+            found = [read(_as_iso(cell)) for cell in self.cells[column]]
             if None not in found:
                 return np.array([time - found[0] for time in found], dtype=np.int64)  # type: ignore[operator]
         return None
@@ -212,12 +218,31 @@ def _number(text: str, decimal: str = ".") -> float:
 
     A point beside a decimal comma would separate thousands: no number, rather than another one.
     """
+    if _THOUSANDS.fullmatch(text):
+        text = re.sub(r"[ '’\u00a0\u202f]", "", text)
     if "_" in text or (decimal == "," and "." in text):
         return math.nan
     try:
         return float(text.replace(decimal, "."))
     except ValueError:
         return math.nan
+
+
+def _as_iso(text: str) -> str:
+    """A date or time of day with the year first, if there is one, and 24 hours; others as it is.
+
+    The month comes first where there is AM or PM, or where the second number is no month.
+    """
+    if (found := _OF_AN_OFFICE.fullmatch(text)) is None:
+        return text
+    first, second, year, hour, minute, seconds, fraction, half = found.groups()
+    if half:
+        hour = int(hour) % 12 + 12 * (half.lower() == "pm")
+    time = f"{int(hour):02d}:{minute}:{seconds}{fraction or ''}"
+    if year is None:
+        return time
+    month, day = (first, second) if half or int(second) > 12 else (second, first)
+    return f"{year}-{int(month):02d}-{int(day):02d} {time}"
 
 
 def _moment(text: str) -> int | None:

@@ -18,6 +18,7 @@ _MOST_NAMED, _MOST_JOINTS = 40, 100
 """Links in a message, and turning joints of one arm (ours)."""
 _TIPS = ("tool0", "flange", "link_eef")
 """Links that are the flange by ROS's conventions (REP 199) and UFACTORY's; the first there is."""
+_PREFIXED_TIPS = tuple(f"_{tip}" for tip in _TIPS)
 _JAW = re.compile("grip|jaw|finger|claw|knuckle|thumb|pinch|tong", re.IGNORECASE)
 _JAW_MESH = re.compile("jaw|finger|claw|thumb|pinch", re.IGNORECASE)
 """Of a mesh's file name, which may be the only one that a CAD program's export leaves telling."""
@@ -54,6 +55,9 @@ def read_urdf(
     try:
         if unknown := hold.keys() - {joint.name for joint in joints}:
             raise ConfigurationError(f"it has no joint {min(unknown)!r} to hold")
+        for joint in joints:
+            if joint.name in hold and joint.mimics is not None:
+                raise joint.error(f"follows {joint.mimics} (<mimic>), and does not stand still")
         for link in {tip, base} - {None, *links}:
             few = ", ".join(links[:_MOST_NAMED])
             raise ConfigurationError(f"it has no link {link!r}; it has {few}")
@@ -111,9 +115,17 @@ def _flange(
     Raises:
         UnclearFlangeError: Several may be it, or a gripper's joint turns as the arm's own do.
     """
-    for tip in _TIPS:
-        if tip in links:
-            return tip
+    plain = next((tip for tip in _TIPS if tip in links), None)
+    if plain is not None:
+        own = {joint.name for joint in _path(plain, moving, base) if joint.free}
+        for other in (link for link in links if link.endswith(_PREFIXED_TIPS)):
+            turned = {joint.name for joint in _path(other, moving, base) if joint.free}
+            if turned and own.isdisjoint(turned):
+                raise UnclearFlangeError(
+                    f"it has several arms, which end in {plain} and {other}; say whose is meant "
+                    "with --tip"
+                )
+        return plain
     start = links[0] if base is None else base
     turns, of_jaw, jaws = {start: 0}, {start: False}, list[str]()
     """How many of the arm's joints turn up to a link; whether a joint called jaw is among them."""
@@ -131,7 +143,7 @@ def _flange(
         ends += [link] if free and not of_jaw[link] else []
     most = max(turns.values())
     ends = [link for link in ends if turns[link] == most]
-    named = [n for n in turns if turns[n] == most and n.endswith(tuple(f"_{t}" for t in _TIPS))]
+    named = [n for n in turns if turns[n] == most and n.endswith(_PREFIXED_TIPS)]
     if len(named) == 1 and not of_jaw[named[0]]:
         return named[0]
     last = [joint for joint in _path(ends[0], moving, start) if joint.free] if ends else []

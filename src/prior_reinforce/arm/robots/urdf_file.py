@@ -184,13 +184,22 @@ class Joint:
         x, y, z = self.vector("axis", "xyz")
         length = math.hypot(x, y, z)
         if abs(length - 1) > _LENGTH_OF_AXIS:
-            raise self.error('needs an axis of length 1, such as <axis xyz="0 0 1"/>')
+            has = (
+                f"its <axis> has {length:.3g}"
+                if "axis" in self.parts
+                else ('without an <axis> a URDF means <axis xyz="1 0 0"/>')
+            )
+            raise self.error(f"needs an axis of length 1, and {has}; write the one it turns about")
         return x / length, y / length, z / length
 
     def limits(self) -> tuple[float, float, float]:
         """Lowest and highest position, and largest speed."""
         if "mimic" in self.parts:
-            raise self.error("follows another (<mimic>), and so is no joint of its own; say --tip")
+            raise self.error(
+                f"follows another (<mimic> of {self.mimics}), and so is no joint of its own; say a "
+                "--tip before it, or, where the arm goes on behind it, --robot none: no limits are "
+                "then checked"
+            )
         velocity = self.number("limit", "velocity")
         if not velocity or not 0 < velocity <= _FASTEST:
             says = "no velocity limit" if not velocity else f"a velocity limit of {velocity:g}"
