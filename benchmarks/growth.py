@@ -211,7 +211,8 @@ def main() -> None:
         return
     lines = [
         f"Processor time before ({arguments.before}) and after, by `benchmarks/growth.py`; medians "
-        f"of {arguments.repeats}, in turn, load {os.getloadavg()[0]:.1f} when it began.\n",
+        f"of {arguments.repeats}, in turn, load {os.getloadavg()[0]:.1f} when it began. Over the "
+        f"limit: longer than {arguments.limit:g} s, the making of that day included.\n",
         "| | size | before | after | before / after |",
         "|---|---|---|---|---|",
     ]
