@@ -214,6 +214,7 @@ def headlines(results: Results) -> Mapping[str, Callable[[], Table]]:
         "p-hit": lambda: p_hit_table(results.where(recipe="sets")),
         "methods": lambda: Table.of(("behind or before", "method"), methods, four),
         "once": lambda: RECIPES["once"].table(results.where(recipe="once")),
+        "shown once": lambda: RECIPES["afternoon"].table(results.where(recipe="afternoon")),
         "afternoon": lambda: Table.of(("adapter",), after.by("method"), afternoon),
     }
 
