@@ -75,9 +75,9 @@ UNITS: Mapping[str, Unit] = {
         kind="time", factor=1e-9, plural="nanoseconds",
         spellings="nsec nsecs nanosec nanosecs nanosecond nanos",
     ),
+    "day": Unit(kind="time", factor=86400.0, plural="days", spellings=""),
     "min": Unit(kind="time", factor=60.0, plural="minutes", spellings="mins minute"),
     "h": Unit(kind="time", factor=3600.0, plural="hours", spellings="hr hrs hour"),
-    "day": Unit(kind="time", factor=86400.0, plural="days", spellings=""),
     "percent": Unit(
         kind="share", factor=0.01, plural="percent", spellings="%", largest=100.0
     ),

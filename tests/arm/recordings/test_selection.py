@@ -166,3 +166,13 @@ def test_more_than_a_hundred_percent_is_refused_with_both_numbers():
     with pytest.raises(ConfigurationError, match=r"reaches 220 in t0, .*a range has 100"):
         select(some, units=["rad", "percent"])
     assert select(some, units=["rad", "counts"]).units == ("rad", "counts")
+
+
+def test_a_place_is_not_taken_for_joints_of_a_robot():
+    names = ("x", "y", "z", "rx", "ry", "rz")
+    some = takes(names, (0.4, 0.1, 0.3, 0.1, 0.2, 0.3))
+    with pytest.raises(ConfigurationError, match="x, y, z are a place, and not the joints"):
+        select(some, names, [f"j{i}" for i in range(1, 7)], plan_units=["rad"] * 6)
+    assert select(some).units == ("m",) * 3 + ("rad",) * 3
+    with pytest.raises(InvalidDemonstrationsError, match="rz, a place and no joints: name what"):
+        select(some, [f"j{i}" for i in range(1, 7)])

@@ -98,7 +98,31 @@ def _episodes(recordings: Sequence[Recording], chosen: Sequence[int]) -> str:
 
 def _without_takes(what: str, episodes: Sequence[str]) -> Ambiguity:
     """A doubt that leaving some takes out settles."""
-    return Ambiguity(what, f"--leave-out {shlex.join(episodes)}")
+    return Ambiguity(what, f"--leave-out {shlex.join(episodes)}", guessed=False)
+
+
+def doubts_of_times(recordings: Sequence[Recording]) -> list[Ambiguity]:
+    """What is only guessed of the times, one doubt for each option.
+
+    Where some takes only are in another unit, the fewer are to be left out: no option holds for
+    all.
+    """
+    found = {one.option: one for r in reversed(recordings) for one in r.ambiguities}
+    for option, doubt in list(found.items()):
+        asked = [r.episode for r in recordings if option in [one.option for one in r.ambiguities]]
+        others = [r.episode for r in recordings if r.episode not in asked]
+        if not option.startswith("--time-unit") or not others:
+            continue
+        what = (
+            f"{say_names(asked)}: {doubt.what}, but {say_names(others)} would not be in that "
+            "unit: convert what is in another one than the rest, or leave it out"
+        )
+        fewer = asked if len(asked) <= len(others) else others
+        if fewer is asked:
+            del found[option]
+        alone = _without_takes(what, fewer)
+        found[alone.option] = alone
+    return list(found.values())
 
 
 def odd_episodes(
@@ -272,4 +296,9 @@ def judge_units(
         unlike = base_of(recorded[i])[0] != base_of(unit)[0] and said[i] is None
         if recorded[i] == UNIT or unlike:
             recorded[i] = unit  # asked about, and not converted
-    return recorded, [Ambiguity(what, option) for what in unclear], remarks, other
+    return (
+        recorded,
+        [Ambiguity(what, option, UNIT not in option) for what in unclear],
+        remarks,
+        other,
+    )

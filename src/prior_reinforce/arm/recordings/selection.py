@@ -30,7 +30,7 @@ from prior_reinforce.arm.recordings.units import (
     say_names,
 )
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
-from prior_reinforce.plans.whole_turns import attitudes
+from prior_reinforce.plans.whole_turns import TURN, attitudes
 from prior_reinforce.units import base_of
 
 _MOST_LOST = 0.1
@@ -114,6 +114,7 @@ def select(
             f"{len(stated)} units: {list(joints)}"
         )
     joints, guessed = _guess_names(recordings[0], joints) if unnamed else (joints, ())
+    _refuse_places(joints, names, plan_units)
     columns = [_columns(recording, joints, names) for recording in recordings]
     if given == "each" and not recordings[0].named:
         stated = [stated[i] for i in find_channels(names, joints) or range(len(joints))]
@@ -162,6 +163,20 @@ def select(
     )
 
 
+def _refuse_places(
+    joints: Sequence[str], names: Sequence[str], plan_units: Sequence[str] | None
+) -> None:
+    """ConfigurationError if recorded places are to be a plan's joints: `--joints x y z ...`."""
+    places, angles = place_names(joints), plan_units or [""] * len(names)
+    wrong = [j for j, unit in zip(joints, angles, strict=False) if j in places and unit in TURN]
+    if wrong:
+        called = [n for j, n in zip(joints, names, strict=True) if j in wrong]
+        raise ConfigurationError(
+            f"{say_names(wrong)} are a place, and not the joints {say_names(called)}; name "
+            "recorded joints with --joints, or what holds them with --key"
+        )
+
+
 def _spread(unit: str, plan_units: Sequence[str] | None, names: Sequence[str]) -> list[str | None]:
     """One unit for all channels that can be in it, which no gripper or place is in degrees."""
     base = base_of(unit)[0]
@@ -198,6 +213,14 @@ def _columns(recording: Recording, joints: tuple[str, ...], names: tuple[str, ..
         missing = say_names(missing_channels(joints, recording.names))
         fitting = list(joint_vectors(recording.names, len(joints)))
         by_key = f", or numbered columns at once: --key {fitting[0]}" if fitting else ""
+        places = place_names(recording.names)
+        others = {*recording.names} - {n for g in attitudes(recording.names) for n in g} - places
+        if places and len(others) < len(joints) and not fitting:
+            raise InvalidDemonstrationsError(
+                f"episode {recording.episode} has no joint {missing}; it has {there}, a place and "
+                "no joints: name what holds the joints with --key, or import the place into a "
+                "workspace of --robot none"
+            )
         raise InvalidDemonstrationsError(
             f"episode {recording.episode} has no joint {missing}; it has {there}: give the "
             f"recorded names in the plan's order with --joints{by_key}"

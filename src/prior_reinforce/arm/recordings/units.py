@@ -85,14 +85,19 @@ class Ambiguity:
     """What is implausible, and what it looks like: a clause."""
     option: str
     """The option that confirms what it looks like, for instance `--time-unit ms`."""
+    guessed: bool = True
+    """Whether it can be guessed; else it is asked about even where guesses are taken."""
 
 
-def raise_if_ambiguous(ambiguities: Iterable[Ambiguity], also: str = "") -> None:
+def raise_if_ambiguous(
+    ambiguities: Iterable[Ambiguity], also: str = "", *, take_guesses: bool = False
+) -> None:
     """Raise UnclearUnitsError if anything is ambiguous, with all options that settle it.
 
-    `also` are other problems, so that all are reported at once.
+    `also` are other problems, so that all are reported at once. With `take_guesses`, only what
+    cannot be guessed is raised.
     """
-    found = list(dict.fromkeys(ambiguities))
+    found = [one for one in dict.fromkeys(ambiguities) if not (take_guesses and one.guessed)]
     if found:
         options = " ".join(dict.fromkeys(one.option for one in found))
         what = "; ".join(one.what for one in found)
