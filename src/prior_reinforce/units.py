@@ -65,17 +65,19 @@ UNITS: Mapping[str, Unit] = {
     ),
     "ms": Unit(
         kind="time", factor=1e-3, plural="milliseconds",
-        spellings="msec msecs millisec millisecs millisecond",
+        spellings="msec msecs millisec millisecs millisecond millis",
     ),
     "us": Unit(
         kind="time", factor=1e-6, plural="microseconds",
-        spellings="µs μs usec usecs microsec microsecs microsecond",
+        spellings="µs μs usec usecs microsec microsecs microsecond micros",
     ),
     "ns": Unit(
         kind="time", factor=1e-9, plural="nanoseconds",
-        spellings="nsec nsecs nanosec nanosecs nanosecond",
+        spellings="nsec nsecs nanosec nanosecs nanosecond nanos",
     ),
     "day": Unit(kind="time", factor=86400.0, plural="days", spellings=""),
+    "min": Unit(kind="time", factor=60.0, plural="minutes", spellings="mins minute"),
+    "h": Unit(kind="time", factor=3600.0, plural="hours", spellings="hr hrs hour"),
     "percent": Unit(
         kind="share", factor=0.01, plural="percent", spellings="%", largest=100.0
     ),

@@ -396,3 +396,81 @@ def test_a_rail_at_constant_speed_is_a_channel_and_no_clock(tmp_path):
     np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="t,a,rail,n,ms", comments="")
     assert read_recordings(tmp_path)[0].names == ("a", "rail")
     assert [*read_recordings(tmp_path, joints=["a"])[0].left_out] == ["rail"]
+
+
+def table(folder, head, columns, above=""):
+    rows = [",".join(map(repr, map(float, row))) for row in np.column_stack(columns)]
+    path = folder / "t.csv"
+    path.write_text("\n".join([*([above] if above else []), head, *rows]) + "\n")
+    return path
+
+
+JITTER = np.cumsum(np.where(np.arange(60) % 3, 0.009, 0.012))
+SWING = np.sin(np.linspace(0, 3, 60))
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("min", 60), ("h", 3600), ("minutes", 60)])
+def test_times_in_minutes_and_hours(tmp_path, unit, scale):
+    (one,) = read_recordings(table(tmp_path, f"Time [{unit}],a", [JITTER / scale, SWING]))
+    np.testing.assert_allclose(one.times, JITTER - JITTER[0], atol=1e-9)
+
+
+def test_a_unit_of_times_that_is_not_known_is_refused_by_its_name(tmp_path):
+    path = table(tmp_path, "Time [fortnight],a", [JITTER, SWING])
+    with pytest.raises(FileFormatError, match=r"in 'fortnight', which is no known .*--time-unit"):
+        read_recordings(path)
+    assert read_recordings(path, time_unit="s")[0].duration == pytest.approx(np.ptp(JITTER))
+    assert read_recordings(table(tmp_path, "Time (relative),a", [JITTER, SWING]))
+
+
+@pytest.mark.parametrize(
+    ("whole", "part", "scale"),
+    [("seconds", "nanos", 1e9), ("sec", "micros", 1e6), ("stamp_s", "stamp_millis", 1e3)],
+)
+def test_seconds_and_a_part_of_one_by_any_name(tmp_path, whole, part, scale):
+    t = JITTER + 1_760_000_000
+    parts = np.round((t % 1) * scale)
+    (one,) = read_recordings(table(tmp_path, f"{whole},{part},a", [t // 1, parts, SWING]))
+    np.testing.assert_allclose(one.times, JITTER - JITTER[0], atol=2 / scale + 1e-6)
+
+
+def test_times_since_the_row_before_are_summed(tmp_path):
+    steps = np.diff(JITTER, prepend=JITTER[0])
+    for head, scale in (("dt", 1), ("dt_ms", 1000)):
+        path = table(tmp_path, f"{head},a", [steps * scale, SWING])
+        (one,) = read_recordings(path)
+        np.testing.assert_allclose(one.times, JITTER - JITTER[0], atol=1e-9)
+        assert one.names == ("a",)
+        with pytest.raises(ConfigurationError, match=rf"--rate 50, but {head} in m?s says 111"):
+            read_recordings(path, rate=50)
+
+
+@pytest.mark.parametrize("said", ["fps: 40", "robot: UR5e, sample rate = 40 Hz", "dt: 25 ms"])
+def test_the_rate_in_a_comment_holds_for_a_column_of_frames(tmp_path, said):
+    path = table(tmp_path, "frame,a", [np.arange(60), SWING], above=f"# {said}")
+    assert read_recordings(path)[0].period == pytest.approx(0.025)
+    assert read_recordings(path, rate=40)[0].period == pytest.approx(0.025)
+    with pytest.raises(ConfigurationError, match="says 40 frames a second in its comment"):
+        read_recordings(path, rate=100)
+    skipping = np.delete(np.arange(61), 30)
+    path = table(tmp_path, "frame,a", [skipping, SWING], above=f"# {said}")
+    assert read_recordings(path)[0].duration == pytest.approx(1.5)
+
+
+def test_a_rate_in_a_comment_says_nothing_against_times(tmp_path):
+    path = table(tmp_path, "t,a", [JITTER, SWING], above="# control rate: 500\n# fps: 30")
+    for how in ({}, {"rate": 111}):
+        assert read_recordings(path, **how)[0].duration == pytest.approx(np.ptp(JITTER))
+
+
+def test_the_take_whose_times_are_in_another_unit_is_named(tmp_path):
+    for i in range(3):
+        path = table(tmp_path, "time,a", [JITTER * (1000 if i == 1 else 1), SWING])
+        path.rename(tmp_path / f"t{i}.csv")
+    with pytest.raises(UnclearUnitsError, match=r"t1: time in s would be .*looks like ms") as asked:
+        read_recordings(tmp_path)
+    assert asked.value.options == "--leave-out t1"
+    assert len(read_recordings(tmp_path, leave_out=["t1"])) == 2
+    with pytest.raises(UnclearUnitsError, match=r"t0, t2: time in ms, as --time-unit") as asked:
+        read_recordings(tmp_path, time_unit="ms")
+    assert "--leave-out t1" in asked.value.options

@@ -106,3 +106,26 @@ def test_lerobot_whose_action_alone_has_names(tmp_path, joints):
     info["features"]["observation.state"]["names"] = None
     path.write_text(json.dumps(info))
     assert read_recordings(folder, joints=joints)[0].names == JOINTS[::-1]
+
+
+def test_lerobot_whose_state_is_a_place_says_where_the_joints_are(tmp_path):
+    """As converters of Franka and UR write it: names of the state, none of the joints."""
+    folder = tmp_path / "set"
+    place = np.column_stack([0.1 * sampled(0, 50)[1][:, :3], sampled(0, 50)[1][:, :3]])
+    lerobot_set(folder, 50, [place], ["x", "y", "z", "rx", "ry", "rz"])
+    info = json.loads((folder / "meta" / "info.json").read_text())
+    single = {"dtype": "float32", "shape": [6], "names": None}
+    info["features"] |= {"observation.joint_position": single, "observation.joint_vel": single}
+    (folder / "meta" / "info.json").write_text(json.dumps(info))
+    path = folder / "data" / "chunk-000" / "file-000.parquet"
+    rows = sampled(0, 50)[1][:, :6]
+    frames = parquet.read_table(path)
+    for name in ("observation.joint_position", "observation.joint_vel"):
+        frames = frames.append_column(name, pa.array(rows.tolist()))
+    parquet.write_table(frames, path)
+    joints = [f"joint{i}" for i in range(1, 7)]
+    with pytest.raises(FileFormatError, match=r"--key observation.joint_position$"):
+        read_recordings(folder, joints=joints)
+    (one,) = read_recordings(folder, joints=joints, key="observation.joint_position")
+    np.testing.assert_allclose(one.positions, rows, atol=1e-6)
+    assert read_recordings(folder)[0].names[:3] == ("x", "y", "z")

@@ -52,11 +52,14 @@ def times():
 
 
 def imported(folder, **how):
-    """What becomes of it; where something is asked, of following the answer that is offered."""
+    """What becomes of it; where something is asked, of following the answer that is offered.
+
+    What it cannot tell, a number of 250 of a gripper, counts.
+    """
     try:
         return import_demonstrations(folder, outcomes=OUTCOMES, **how)
     except UnclearUnitsError as asked:
-        units = asked.options.removeprefix("--units ").split()
+        units = asked.options.removeprefix("--units ").replace("UNIT", "counts").split()
         return import_demonstrations(folder, outcomes=OUTCOMES, units=units, **how)
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.selection import select
-from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 
 T = np.arange(100) * 0.01
 
@@ -62,3 +62,13 @@ def test_joints_of_a_plan_in_radians_are_not_taken_as_they_are_by_saying_percent
     (asked,) = selection.ambiguities
     assert "pan, lift in rad" in asked.what
     assert asked.option == "--units deg deg percent"
+
+
+def test_a_place_is_not_taken_for_joints_of_a_robot():
+    names = ("x", "y", "z", "rx", "ry", "rz")
+    some = [Recording("throw", T, np.outer(np.sin(T), np.full(6, 0.3)), names)]
+    with pytest.raises(ConfigurationError, match="x, y, z are a place, and not the joints"):
+        select(some, names, [f"j{i}" for i in range(1, 7)], plan_units=["rad"] * 6)
+    assert select(some).units == ("m",) * 3 + ("rad",) * 3
+    with pytest.raises(InvalidDemonstrationsError, match="rz, a place and no joints: name what"):
+        select(some, [f"j{i}" for i in range(1, 7)])

@@ -35,6 +35,10 @@ from prior_reinforce.errors import ConfigurationError, UnclearUnitsError
         ("joint1_pos", "joint1_pos", None),
         ("q [rad/s]", "q [rad/s]", None),
         ("elbow", "elbow", None),
+        ("panDeg", "pan", "deg"),
+        ("liftMm", "lift", "mm"),
+        ("q_min", "q_min", None),
+        ("elbowRadius", "elbowRadius", None),
     ],
 )
 def test_a_unit_that_stands_in_a_channels_name(column, name, unit):
@@ -45,6 +49,8 @@ def test_only_the_units_that_may_stand_there_are_taken():
     assert split_unit("timestamp_ms", SECONDS) == ("timestamp", "ms")
     assert split_unit("timestamp_ms", CHANNEL_UNITS) == ("timestamp_ms", None)
     assert known_unit(" [µs] ") == "us"
+    assert split_unit("timeMs", SECONDS) == ("time", "ms")
+    assert split_unit("Time [min]", SECONDS) == ("Time", "min")
     assert known_unit("counts") is None
 
 

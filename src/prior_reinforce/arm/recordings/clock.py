@@ -36,6 +36,12 @@ _SAYS_TIME = re.compile(
     r"|时间|時間|時刻|时刻|시간",
     re.IGNORECASE,
 )
+_IN_BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*[^\W\d_][^\[\]()]*?)\s*[\])]\s*$")
+"""`Time [weeks]`, a word in brackets."""
+_QUALIFIES = re.compile(
+    r"rel(ative)?|abs(olute)?|local|utc|gmt|unix|epoch|elapsed|system|ros|robot|controller|pc", re.I
+)
+"""Words that say what kind of time it is, and no unit."""
 _SHORTEST, LONGEST = 0.1, 60.0
 """Seconds that a throw, slide or swing is recorded for. Ours, and wide on purpose."""
 _SAME_RATE = 0.05
@@ -49,7 +55,9 @@ _SLOWEST, _FASTEST = 1.0, 1e4
 _RATE = re.compile(
     r"((control|sampl[a-z]*|frame|record[a-z]*)[ _]?)?(fps|fs|hz|rate|freq(uency)?)([ _]?hz)?"
 )
-_PERIOD = re.compile(r"((control|sampl[a-z]*|frame)[ _]?)?(dt|period|time[ _]?step|delta[ _]?t)")
+_PERIOD = re.compile(
+    r"((control|sampl[a-z]*|frame)[ _]?)?(dt|period|time[ _]?step|delta[ _]?t(ime)?)"
+)
 """What files call their frames a second, and the time from one to the next."""
 
 
@@ -57,6 +65,17 @@ def says_time(name: str) -> bool:
     """Whether a column's name says, in some language, that it is a time."""
     spaced = re.sub("(?<=[a-z])(?=[A-Z])", "_", name)
     return _SAYS_TIME.search(spaced) is not None
+
+
+def says_period(name: str) -> bool:
+    """Whether a name says that it is the time from one frame to the next: `dt`, `period_ms`."""
+    return _PERIOD.fullmatch(split_unit(name, SECONDS)[0].strip().lower()) is not None
+
+
+def is_periods(name: str, values: Stamps) -> bool:
+    """Whether a column holds the time since the row before, and not the time itself."""
+    steps = values[1:].astype(float)
+    return says_period(name) and len(steps) > 0 and bool(np.all(steps > 0)) and not rises(values)
 
 
 def rises(values: Stamps) -> bool:
@@ -192,6 +211,12 @@ def clock_of(
             "one time a frame"
         )
     known = unit or split_unit(name, SECONDS)[1]
+    unknown = None if known or time_unit else _IN_BRACKETS.search(name)
+    if unknown is not None and not _QUALIFIES.fullmatch(unknown[1]):
+        raise FileFormatError(
+            f"episode {episode}: {name} is in {unknown[1]!r}, which is no known unit of time "
+            f"({', '.join(SECONDS)}): say it with --time-unit, or convert that column"
+        )
     if FRAME in (time_unit, known):
         frames = rate or own_rate
         if frames is None or time_unit not in (None, FRAME):
@@ -311,7 +336,7 @@ def _doubt_rate(name: str, rate: float, count: int) -> tuple[Ambiguity, ...]:
     """Doubt a declared rate at which no arm is recorded: `dt` 20 is in milliseconds, or a rate."""
     if _SLOWEST <= rate <= _FASTEST:
         return ()
-    in_units = [rate / SECONDS[unit] for unit in SECONDS]
+    in_units = [rate / scale for unit, scale in SECONDS.items() if unit not in ("min", "h")]
     others = [1 / rate, *in_units] if _RATE.fullmatch(name.lower()) else [*in_units, 1 / rate]
     likely = [other for other in others if _SLOWEST <= other <= _FASTEST] or [rate]
     what = f"{name} in the file says {rate:.4g} frames a second, {count / rate:.4g} s in all"

@@ -10,8 +10,9 @@ import re
 import shlex
 from collections.abc import Sequence
 from functools import partial
+from itertools import islice
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,7 +22,9 @@ from prior_reinforce.arm.recordings.clock import (
     NO_COLUMN,
     Clock,
     Times,
+    declared_rate,
     hold_together,
+    is_periods,
     rises,
     says_time,
     skips_frames,
@@ -60,6 +63,14 @@ _FEWEST_COUNTS = 20
 """Rows of which it can be said that a column counts them. Ours."""
 _MOST_WORDS = 8
 """Texts between which a column switches. Ours."""
+_MOST_COMMENTS = 200
+"""Lines above a table that are looked through. Ours."""
+_SAYS = re.compile(
+    r"([A-Za-z][A-Za-z_ ]*?)\s*[:=]\s*(\d+\.?\d*(?:[eE][-+]?\d+)?)(?![\d.:-])\s*([A-Za-zµ]*)"
+)
+"""`fps: 40`, `sample rate = 1 kHz`."""
+_SAME_RATE = 0.05
+"""Share by which a given rate may differ from that of a comment. Ours."""
 _SECONDS = re.compile(r"(?P<stem>.*?)(secs?|seconds|s)")
 
 
@@ -91,6 +102,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             yield path.stem, unread
             continue
         table = read_table(path, options.delimiter, options.decimal)
+        said = _said_above(path)
         if not table.names or len(table) < 2:
             raise FileFormatError(
                 f"{path} has {len(table)} frames; expected a line of column names and two frames "
@@ -99,7 +111,37 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         column, names, guessed = _throws(table, path.stem, options, alone=len(paths) == 1)
         for episode in sorted(set(names), key=natural_order):
             own = table.rows([i for i, name in enumerate(names) if name == episode])
-            yield episode, partial(_episode, own, episode, options, column, guessed)
+            yield episode, partial(_episode, own, episode, options, column, guessed, said)
+
+
+def _said_above(path: Path) -> dict[str, float]:
+    """Numbers by name in the comments above a table, `# fps: 40`; `dt_ms` of `dt: 25 ms`."""
+    said: dict[str, float] = {}
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for line in islice(file, _MOST_COMMENTS):
+            if line.strip() and not line.lstrip("\ufeff ").startswith(("#", "%", "//")):
+                break
+            for name, number, unit in _SAYS.findall(line):
+                of_time = known_unit(unit) in SECONDS
+                if of_time or unit.lower() in ("", "hz", "khz", "fps"):
+                    scale = 1000 if unit.lower() == "khz" else 1
+                    said[f"{name}_{unit}" if of_time else name] = float(number) * scale
+    return said
+
+
+def _declared(table: Table, said: dict[str, float], options: ReadOptions) -> dict[str, Any]:
+    """The rate that comments declare, as `clock_of` takes it.
+
+    ConfigurationError if another rate is given.
+    """
+    found = declared_rate(table.where, said, options.rate)
+    own, rate = found.get("own_rate"), options.rate
+    if own and rate and abs(own - rate) > _SAME_RATE * own:
+        raise ConfigurationError(
+            f"{table.where} says {own:g} frames a second in its comment {found['rate_name']}, but "
+            f"--rate {rate:g}; drop --rate, or correct that comment"
+        )
+    return found
 
 
 def _throws(
@@ -185,6 +227,7 @@ def _episode(
     options: ReadOptions,
     episode_column: int | None,
     guessed: tuple[Ambiguity, ...],
+    above: dict[str, float],
 ) -> Recording:
     log = next((g for g in LOG_FORMATS if set(g.columns) <= set(table.names)), None)
     said, told = _names_in_cells(table, options)
@@ -192,7 +235,7 @@ def _episode(
     names = [said.get(i, name) for i, name in enumerate(table.names)]
     joints = options.joints if table.named else None
     found = None if joints is None else find_channels(joints, names)
-    times = _time_columns(table, options, [episode_column, *(found or ())])
+    times = _time_columns(table, options, above, [episode_column, *(found or ())])
     aside = {*times.columns, *times.held, episode_column, *told}
     others = [i for i in range(len(names)) if i not in aside]
     channels, named = list(others), table.named
@@ -203,7 +246,7 @@ def _episode(
     remarks = []
     if log is not None:
         remarks.append(f"{log.name}: time in {log.time_unit}, motion is {log.key} (measured)")
-    clock = _clock(table, episode, times, options, log and log.time_unit)
+    clock = _clock(table, episode, times, options, above, log and log.time_unit)
     counts = [i for i in others if table.is_number(i) and _counts(table, i, clock.times)]
     rising = [i for i in counts if channels == others and table.named and not options.joints]
     all_read = not options.key and found is None
@@ -284,13 +327,18 @@ class _Times(NamedTuple):
     """Columns that must agree with it."""
     unit: str | None = None
     """Unit of the last column, where it is known by other columns or by its numbers."""
+    summed: bool = False
+    """Whether the column holds the time since the row before."""
 
 
-def _time_columns(table: Table, options: ReadOptions, others: Sequence[int | None]) -> _Times:
+def _time_columns(
+    table: Table, options: ReadOptions, above: dict[str, float], others: Sequence[int | None]
+) -> _Times:
     """The columns of times; whatever rises steadily, and is no joint, may be one."""
     called = _called_times(table, options)
     if options.time_column is not None:
-        return _Times(tuple(called))
+        summed = any(is_periods(table.names[i], table.values[:, i]) for i in called)
+        return _Times(tuple(called), summed=summed)
     if (pair := _seconds_and_parts(table)) is not None:
         return pair
     free = [i for i in range(len(table.names)) if i not in others]
@@ -302,10 +350,13 @@ def _time_columns(table: Table, options: ReadOptions, others: Sequence[int | Non
         held = [i for i in free if says_time(table.names[i])]
         held = [i for i in held if np.all(np.diff(table.values[:, i]) > 0)]
         return _Times((called[0],), (), tuple({*held, *skipping} - {called[0]}))
+    for i in free:
+        if table.named and is_periods(table.names[i], table.values[:, i]):
+            return _Times((i,), summed=True)
     nameless = [i for i in rising if table.named and is_unnamed(table.names[i])]
     if nameless and table.nanoseconds(nameless[0]) is not None:
         return _Times((nameless[0],))
-    if options.rate is not None:
+    if options.rate is not None or _declared(table, above, options):
         # Whatever else rises is held against the rate; what counts rows says nothing of it.
         long = len(table) >= _FEWEST_COUNTS
         rising = [i for i in rising if long and np.any(np.diff(table.stamps(i)) != 1)]
@@ -343,10 +394,15 @@ def _counts(table: Table, column: int, times: Times) -> bool:
 
 
 def _clock(
-    table: Table, episode: str, times: _Times, options: ReadOptions, unit: str | None
+    table: Table,
+    episode: str,
+    times: _Times,
+    options: ReadOptions,
+    above: dict[str, float],
+    unit: str | None,
 ) -> Clock:
     if not times.columns:
-        return options.clock(episode, len(table))
+        return options.clock(episode, len(table), **_declared(table, above, options))
     time = times.columns[0]
     dates, name = table.nanoseconds(time), table.names[time] or f"column {time + 1}"
     unit = times.unit or unit
@@ -355,8 +411,13 @@ def _clock(
         whole, part = (table.values[:, i] for i in times.columns)
         stamps = (whole - whole[0]) / SECONDS[unit] + part
         name = f"{name} and {table.names[times.columns[1]]}"
+    if times.summed:
+        stamps = np.concatenate([[0.0], np.cumsum(stamps[1:])])
     unit = unit or table.units[time]
-    clock = options.clock(episode, len(table), stamps=stamps, name=name, unit=unit)
+    # Where there are times, a comment may be of another rate, as that of control.
+    frames = FRAME in (unit, options.time_unit)
+    declared = _declared(table, above, options) if frames else {}
+    clock = options.clock(episode, len(table), stamps=stamps, name=name, unit=unit, **declared)
     held = {table.names[i]: table.values[:, i] for i in times.held if table.is_number(i)}
     hold_together(table.where, {name: clock.times, **held})
     return clock

@@ -20,6 +20,7 @@ import numpy as np
 from prior_reinforce.arm.recordings import csv, hdf5, lerobot, npz, ros, zarr
 from prior_reinforce.arm.recordings.bounds import check_numbers
 from prior_reinforce.arm.recordings.inspection import Inspection, inspect
+from prior_reinforce.arm.recordings.judging import doubts_of_times
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.outcomes import (
     OUTCOMES_FILE,
@@ -151,7 +152,7 @@ def import_demonstrations(
     if not isinstance(outcomes, Mapping):
         known, unclear = in_units(known, outcome_units, outcome_unit)
         ambiguities += unclear
-    raise_if_ambiguous(() if take_guesses else ambiguities)
+    raise_if_ambiguous(ambiguities, take_guesses=take_guesses)
     partial = not {"episodes", "leave_out"}.isdisjoint(recordings.options.given)
     outcomes_of(selection.episodes, known, partial=partial)  # before the work of the next line
     inspection = inspect(selection, preprocessing, robot, gate)
@@ -229,7 +230,7 @@ class Recordings:
     @property
     def ambiguities(self) -> tuple[Ambiguity, ...]:
         """What is only guessed of the times: the first episode's, for all with the same remedy."""
-        by_option = {one.option: one for r in reversed(self.episodes) for one in r.ambiguities}
+        by_option = {one.option: one for one in doubts_of_times(self.episodes)}
         unsaid = {"rests", "episodes", "leave_out"}.isdisjoint(self.options.given)
         if len(self.episodes) > 1 or not unsaid or by_option:
             return tuple(by_option.values())

@@ -29,6 +29,7 @@ from prior_reinforce.arm.recordings.clock import (
     says_time,
     tells_time,
 )
+from prior_reinforce.arm.recordings.naming import missing_channels
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     Episodes,
@@ -36,6 +37,8 @@ from prior_reinforce.arm.recordings.recording import (
     Recording,
     named_damage,
 )
+from prior_reinforce.arm.recordings.units import is_no_angle, place_names, say_names
+from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.errors import FileFormatError
 
 FrameNumbers = Shaped[np.ndarray, " T"]
@@ -74,6 +77,8 @@ def read(source: Path, options: ReadOptions) -> Episodes:
                 f"{vectors}: say which with the key"
             )
         key = keys[0]
+        if not options.key:
+            _point_to_joints(source, key, features, widths, options.joints or ())
         widths = {n: w for n, w in widths.items() if n not in _OWN}
         beside = [
             n for n, w in widths.items() if n not in keys and (may_move(n, w) or says_time(n))
@@ -105,6 +110,34 @@ def read(source: Path, options: ReadOptions) -> Episodes:
 
     for number in sorted(lengths.keys() | frames.keys()):
         yield str(number), partial(episode_of, number)
+
+
+def _point_to_joints(
+    source: Path,
+    key: str,
+    features: dict[str, Any],
+    widths: dict[str, int],
+    joints: tuple[str, ...],
+) -> None:
+    """Raise FileFormatError naming the features of the joints, where the usual one has a place."""
+    own = _names(features[key])
+    missing = missing_channels(joints, own) if len(own) == widths[key] else []
+    if not missing or not place_names(own):
+        return
+    counts = {len(joints), sum(not is_no_angle(joint) for joint in joints)}
+    others = [
+        name
+        for name, width in widths.items()
+        if name not in (key, _COMMANDED)
+        and not says_no_position(name)
+        and (width in counts if not _names(features[name]) else True)
+        and len(missing_channels(joints, _names(features[name]) or joints)) < len(missing)
+    ]
+    where = " or ".join(f"--key {name}" for name in others) or "none of its other features does"
+    raise FileFormatError(
+        f"{source}: {key} holds {say_names(own)}, a place and not the joints {say_names(missing)}; "
+        f"say what holds these: {where}"
+    )
 
 
 def _clock(

@@ -29,7 +29,7 @@ class ReadOptions:
     it again for what is stored beside it, such as a gripper's opening."""
     rate: float | None = None
     """Frames per second, for a source without times; if it has times, they must agree."""
-    time_unit: Literal["s", "ms", "us", "ns", "day", "frame"] | None = None
+    time_unit: Literal["s", "ms", "us", "ns", "min", "h", "day", "frame"] | None = None
     """Unit of the recorded times, if their name does not give it (`t_ms`); `frame` for a column
     that counts frames."""
     time_column: str | None = None

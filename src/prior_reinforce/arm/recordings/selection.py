@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from prior_reinforce.arm.recordings.beside import columns_beside
+from prior_reinforce.arm.recordings.judging import UNIT, in_one_unit, judge_units, odd_episodes
 from prior_reinforce.arm.recordings.naming import (
     find_channels,
     joint_vectors,
@@ -22,10 +22,9 @@ from prior_reinforce.arm.recordings.units import (
     Ambiguity,
     conversion,
     is_no_angle,
-    is_possible,
-    judge_unit,
     known_unit,
     listed,
+    matrix_names,
     one_for_all,
     place_names,
     say_names,
@@ -37,13 +36,6 @@ from prior_reinforce.units import base_of
 _MOST_LOST = 0.1
 """Share of an episode's frames that may be lost. Ours: lost packets come in bursts of some frames;
 where more is missing, the recorder failed."""
-
-
-_NORMALISED = (
-    ", unless LeRobot recorded shares of each joint's range (-100 to 100, where use_degrees is "
-    "unset): those are no angles; record with use_degrees, or import them as percent into a "
-    "workspace of --robot none"
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,13 +114,23 @@ def select(
             f"{len(stated)} units: {list(joints)}"
         )
     joints, guessed = _guess_names(recordings[0], joints) if unnamed else (joints, ())
+    _refuse_places(joints, names, plan_units)
     columns = [_columns(recording, joints, names) for recording in recordings]
     if given == "each" and not recordings[0].named:
         stated = [stated[i] for i in find_channels(names, joints) or range(len(joints))]
+    if UNIT in (units or ()):
+        named = say_names([n for n, u in zip(names, stated, strict=True) if u in (UNIT, None)])
+        raise ConfigurationError(
+            f"--units {UNIT} stands for the unit of {named}, which only you know: put deg, mm, "
+            "percent, ... in its place, or counts for a number without a unit"
+        )
+    by_file = [[r.units[i] for i in c] for r, c in zip(recordings, columns, strict=True)]
     said = [_said_unit(recordings, columns, i, unit) for i, unit in enumerate(stated)]
     picked = [_picked(*each, joints) for each in zip(recordings, columns, strict=True)]
+    picked, mixed, unsaid = in_one_unit(picked, names, by_file, said, given != "no")
     most = np.abs(np.concatenate([r.positions for r in picked])).max(axis=0)
     no_angles = {name for group in attitudes(names) if len(group) == 4 for name in group}
+    no_angles |= matrix_names(names)
     no_angles |= {n for n, m in zip(names, most, strict=True) if is_no_angle(n) and m <= 1}
     lengths = place_names(names)
     usual = ["1" if n in no_angles else "m" if n in lengths else "rad" for n in names]
@@ -136,8 +138,10 @@ def select(
     wanted = wanted if plan_units is None else list(plan_units)
     # No option may contradict a unit that the file states.
     open_ = all(r.units[i] is None for r, c in zip(recordings, columns, strict=True) for i in c)
-    recorded, unclear, remarks, other = _judge_units(
-        picked,
+    odd, doubts = odd_episodes(picked, names, by_file, said, given != "no")
+    kept = [r for r in picked if r.episode not in odd] or picked
+    recorded, unclear, remarks, other = judge_units(
+        kept,
         names,
         said,
         wanted,
@@ -152,11 +156,25 @@ def select(
         names,
         tuple(wanted),
         tuple(recorded),
-        (*guessed, *unclear),
-        tuple(remarks),
+        (*guessed, *unsaid, *(doubts if given == "no" else ()), *unclear),
+        (*mixed, *(doubt.what for doubt in doubts if given != "no"), *remarks),
         other,
         _left_out(recordings, columns),
     )
+
+
+def _refuse_places(
+    joints: Sequence[str], names: Sequence[str], plan_units: Sequence[str] | None
+) -> None:
+    """ConfigurationError if recorded places are to be a plan's joints: `--joints x y z ...`."""
+    places, angles = place_names(joints), plan_units or [""] * len(names)
+    wrong = [j for j, unit in zip(joints, angles, strict=False) if j in places and unit in TURN]
+    if wrong:
+        called = [n for j, n in zip(joints, names, strict=True) if j in wrong]
+        raise ConfigurationError(
+            f"{say_names(wrong)} are a place, and not the joints {say_names(called)}; name "
+            "recorded joints with --joints, or what holds them with --key"
+        )
 
 
 def _spread(unit: str, plan_units: Sequence[str] | None, names: Sequence[str]) -> list[str | None]:
@@ -195,6 +213,14 @@ def _columns(recording: Recording, joints: tuple[str, ...], names: tuple[str, ..
         missing = say_names(missing_channels(joints, recording.names))
         fitting = list(joint_vectors(recording.names, len(joints)))
         by_key = f", or numbered columns at once: --key {fitting[0]}" if fitting else ""
+        places = place_names(recording.names)
+        others = {*recording.names} - {n for g in attitudes(recording.names) for n in g} - places
+        if places and len(others) < len(joints) and not fitting:
+            raise InvalidDemonstrationsError(
+                f"episode {recording.episode} has no joint {missing}; it has {there}, a place and "
+                "no joints: name what holds the joints with --key, or import the place into a "
+                "workspace of --robot none"
+            )
         raise InvalidDemonstrationsError(
             f"episode {recording.episode} has no joint {missing}; it has {there}: give the "
             f"recorded names in the plan's order with --joints{by_key}"
@@ -253,8 +279,12 @@ def _left_out(recordings: Sequence[Recording], columns: Sequence[list[int]]) -> 
 def _said_unit(
     recordings: Sequence[Recording], columns: list[list[int]], index: int, given: str | None
 ) -> str | None:
-    """Unit of a channel as given or as its file states it; None if neither does."""
+    """Unit of a channel as given, else as the first file that states one does; None if none does.
+
+    ConfigurationError if a file states another than the one that is given.
+    """
     given = given if given is None else known_unit(given) or given
+    first = None
     for recording, column in zip(recordings, columns, strict=True):
         own = recording.units[column[index]]
         if own is not None and given not in (None, own):
@@ -262,91 +292,5 @@ def _said_unit(
                 f"{recording.names[column[index]]} of episode {recording.episode} is in {own}, but "
                 f"--units says {given}; correct or drop it"
             )
-        given = given or own
-    return given
-
-
-def _judge_units(
-    recordings: Sequence[Recording],
-    names: Sequence[str],
-    said: Sequence[str | None],
-    wanted: Sequence[str],
-    *,
-    given: Literal["no", "one for all", "each"],
-    open_: bool,
-    normalised: bool,
-    fixed: bool,
-) -> tuple[list[str], list[Ambiguity], list[str], str]:
-    """Infer the unit of each channel: as stated if possible, else as wanted, else as it looks.
-
-    `said` are units given or from the file, and `given` how they were given: believed where they
-    are possible. `open_`: the files state none. `fixed`: the plan says its units.
-
-    Returns units, what is ambiguous of them, remarks, and `Selection.other_unit`.
-    """
-    reach = np.array([np.abs(r.positions).max(axis=0) for r in recordings])
-    most = reach.max(axis=0)
-    recorded = [unit or w for unit, w in zip(said, wanted, strict=True)]
-    angles = [i for i, unit in enumerate(recorded) if unit in TURN and not is_no_angle(names[i])]
-    small = given == "one for all" and open_ and {recorded[i] for i in angles} == {"deg"}
-    small = small and most[angles].max() < TURN["rad"]
-    # Joints of one recorder have one unit, unless few of them only are out of range.
-    far = [i for i in angles if judge_unit(recorded[i], most[i]) not in (recorded[i], None)]
-    near = max((most[i] for i in angles if i not in far), default=math.inf)
-    if far and (2 * len(far) > len(angles) or near > TURN["rad"] or given != "no"):
-        far = angles
-    lengths = place_names(names)  # of one recorder, in one unit
-    places = [i for i, unit in enumerate(recorded) if unit == "m" and names[i] in lengths]
-    groups: dict[tuple[str, str | None, str], list[int]] = {}
-    doubtful, other = dict[tuple[str, str], int](), ""
-    single = len(set(recorded)) == 1
-    for i, unit in enumerate(recorded):
-        number = max(most[j] for j in places) if i in places else most[i]
-        looks, why = judge_unit(unit, number, opening=is_no_angle(names[i])), "which no arm does"
-        if unit == "percent":
-            why = "which is hardly a motion" if looks else "which no share of a range does"
-        alone = i in far and len(far) < len(angles) and not fixed
-        if (alone or is_no_angle(names[i])) and said[i] is None and unit in TURN and looks != unit:
-            why = "by its name" if not alone else f"beside joints in {unit}"
-            looks, why = "percent", f"and {why} it is no angle"
-        elif small and i in angles:
-            looks, why = "rad", "which is hardly a motion"
-        elif looks == unit and i in far:
-            looks = "deg"
-        elif looks == unit:
-            continue
-        alike = far if i in far else [i]
-        impossible = open_ and single and not all(is_possible(unit, most[j]) for j in alike)
-        if said[i] is None or (small and i in angles) or (given != "no" and impossible and looks):
-            groups.setdefault((unit, looks, why), []).append(i)
-        elif looks is not None:
-            worst = doubtful.setdefault((unit, looks), i)
-            doubtful[unit, looks] = i if most[i] > most[worst] else worst
-    remarks = []
-    for (unit, looks), i in doubtful.items():
-        where = f"{names[i]} of {recordings[int(np.argmax(reach[:, i]))].episode}"
-        other = f"--units {looks}" if open_ and single else other
-        advice = f"if it was recorded in {looks}, say {other}" if other else "check its unit"
-        remarks.append(f"{where} reaches {most[i]:.4g} {unit}, and arms do not: {advice}")
-    unclear = []
-    for (unit, looks, why), among in groups.items():
-        worst = among[int(np.argmax(most[among]))]
-        episode = recordings[int(np.argmax(reach[:, worst]))].episode
-        by = ", as --units says," if given != "no" else ""
-        seen = f"it looks like {looks}" if looks else "check that recording"
-        if looks == "deg" and normalised and most[among].max() <= 100:
-            seen += _NORMALISED
-        called = say_names([names[i] for i in among])
-        reaches = f"would reach {most[worst]:.4g} ({names[worst]} of {episode})"
-        unclear.append(f"{called} in {unit}{by} {reaches}, {why}: {seen}")
-        for i in among:
-            recorded[i] = looks or unit
-    in_degrees = bool(angles) and {recorded[i] for i in angles} == {"deg"}
-    if given != "no" and normalised and in_degrees and not unclear and most[angles].max() <= 100:
-        remarks.append(f"degrees, as --units says{_NORMALISED}")
-    single = len(set(recorded)) == 1
-    option = f"--units {recorded[0] if single else ' '.join(recorded)}"
-    for i, unit in enumerate(wanted):
-        if base_of(recorded[i])[0] != base_of(unit)[0] and said[i] is None:
-            recorded[i] = unit  # asked about, and not converted
-    return recorded, [Ambiguity(what, option) for what in unclear], remarks, other
+        first = first or own
+    return given or first
