@@ -132,6 +132,51 @@ def test_what_moves_beside_is_told_by_its_numbers(name, values, moves):
     assert ([*moves_beside(Q, {name: values}, T)] == [name]) == moves
 
 
+SWUNG = Q[0] + 0.9 * (Q - Q[0])
+"""As another arm that moves in parallel, from the same pose."""
+
+
+@pytest.mark.parametrize(
+    ("motion", "name", "values", "moves"),
+    [
+        ("q_left", "q_right", SWUNG, True),
+        ("q_left", "q_right", Q, True),
+        ("qLeft", "qRight", SWUNG, True),
+        ("q_l", "q_r", SWUNG, True),
+        ("q_izquierda", "q_derecha", SWUNG, True),
+        ("robot0_joint_pos", "robot1_joint_pos", SWUNG, True),
+        ("q", "right/q", SWUNG, True),
+        ("q", "other", SWUNG + [-0.4, 0, 0], True),
+        ("q_left", "q_left_cmd", LATE, False),
+        ("q_left", "target", LATE, False),
+        ("q", "q_r", LATE, False),
+        ("q", "brightness", LATE, False),
+        ("robot0_joint_pos", "robot0_target", np.rad2deg(LATE), False),
+    ],
+)
+def test_another_arm_in_parallel_is_no_command(motion, name, values, moves):
+    assert bool(moves_beside(Q, {name: values}, T, [motion])) == moves
+
+
+@pytest.mark.parametrize(
+    ("others", "moves"),
+    [
+        ({"gripper": 80 - 70 * S[::3], "t_gripper": T[::3]}, True),
+        ({"gripper": 80 - 70 * S[::8], "t_gripper": T[::8]}, True),
+        ({"gripper": 80 - 70 * S[::3]}, True),
+        ({"grip": S[::3] > 0.5}, True),
+        ({"q_cmd": LATE[::3]}, False),
+        ({"chrono": 7 + T[::3], "n": np.arange(34), "t_gripper": T[::3]}, False),
+        ({"home": Q[0], "limits": np.array([[-1.0, 1.0]] * 3), "gains": 1 + S[::8]}, False),
+        ({"points": np.random.default_rng(0).normal(size=(60, 3))}, False),
+    ],
+)
+def test_what_moves_at_a_rate_of_its_own_is_named(others, moves):
+    found = moves_beside(Q, others, T)
+    assert bool(found) == moves
+    assert not moves or all(f"({len(next(iter(others.values())))} frames" in name for name in found)
+
+
 def test_numbered_columns_beside_are_one_group():
     names = [*UR, *(f"{stem}_{i}" for stem in ("left", "target") for i in range(3))]
     values = np.column_stack([Q, -Q, Q + 0.001])

@@ -14,7 +14,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.clock import NO_COLUMN, Clock, Times, clock_among, says_time
+from prior_reinforce.arm.recordings.clock import (
+    NO_COLUMN,
+    Clock,
+    Times,
+    clock_among,
+    says_time,
+    tells_time,
+)
 from prior_reinforce.arm.recordings.naming import missing_channels, vectors
 from prior_reinforce.arm.recordings.recording import (
     Positions,
@@ -64,6 +71,17 @@ _SAME, _SHIFTS = 0.3, 21
 fifth of the recording either way. Ours: a command differs by what a controller lags behind."""
 _SCALES = (1.0, TURN["deg"] / TURN["rad"], TURN["rad"] / TURN["deg"], 1000.0, 100.0, 0.01, 0.001)
 """Factors between readings in two units."""
+_OTHER_ZERO = 1.0
+"""Part of its spread by which a command lies beside the motion at most, as under a load. Ours; what
+starts from another pose is another arm."""
+_SIDE = re.compile(
+    r"(?<!b)right|left|izq|der(?=ech)|gauche|droite?|(robot|arm|hand|gripper|follower|leader)_?\d+"
+    r"|(?<![a-z])[lr](?![a-z])"
+)
+"""Which of two arms a name is of."""
+_FEWEST, _BENDS = 20, 6
+"""Frames of what moves at a rate of its own and has no times, and how often it goes through its
+range at most; ours: tables of other things jump."""
 _SAME_CLOCK = 0.01
 """Share by which two clocks of a recording differ at most. Ours."""
 
@@ -98,7 +116,8 @@ def recorded_among(
         declared = None if options.time_column == NO_COLUMN else stated
         clock = clock_among(where, episode, kept, arrays, options, declared)
     others = {name: array for name, array in arrays.items() if name not in keys}
-    more = {"left_out": moves_beside(positions, others, clock.times)} | more
+    called = (*keys, *(names or known))
+    more = {"left_out": moves_beside(positions, others, clock.times, called)} | more
     more["remarks"] = (*more.get("remarks", ()), *why)
     if not bare:
         unclear = _other_names(episode, texts, positions.shape[1], options.joints or ())
@@ -134,7 +153,10 @@ def joined(
     columns = [arrays[key] if arrays[key].ndim > 1 else arrays[key][:, None] for key in keys]
     if len({len(column) for column in columns}) > 1:
         each = ", ".join(f"{key} has {len(arrays[key])}" for key in keys)
-        raise FileFormatError(f"the arrays have different frames: {each}; take one of them")
+        raise FileFormatError(
+            f"the arrays have different frames: {each}; take one of them, or write the others at "
+            f"the times of {keys[0]}: numpy.interp(its times, their own times, their values)"
+        )
     widths = [column.shape[1] for column in columns]
     said = list(names_said(where, texts, sum(widths), joints))
     if len(keys) > 1 and not said:
@@ -239,31 +261,61 @@ def columns_beside(
     in_groups = {i for group in groups for i in group}
     groups += [[i] for i in others if i not in in_groups]
     arrays = {say_names([names[i] for i in group]): values[:, group] for group in groups}
-    return moves_beside(values[:, list(taken)], arrays, times)
+    return moves_beside(values[:, list(taken)], arrays, times, [names[i] for i in taken])
 
 
-def moves_beside(motion: Positions, others: Arrays, times: Times) -> dict[str, tuple[float, float]]:
-    """Return the range of each array of the same frames that moves and is not taken.
+def moves_beside(
+    motion: Positions, others: Arrays, times: Times, called: Sequence[str] = ()
+) -> dict[str, tuple[float, float]]:
+    """Return the range of each array that moves and is not taken, at the motion's rate or its own.
 
-    Not listed are clocks, other readings of the motion such as its commands, and what is named like
-    rates, forces, poses, or anything else that is no part of an arm.
+    `called` are names of the motion. Not listed are clocks, other readings of the motion such as
+    its commands, and what is named like rates, forces, poses, or anything else that is no part of
+    an arm.
     """
     found = {}
     for name, values in others.items():
-        if (
-            values.ndim not in (1, 2)
-            or len(values) != len(motion)
-            or values.dtype.kind not in "biuf"
-        ):
+        if values.ndim not in (1, 2) or values.dtype.kind not in "biuf" or not values.size:
             continue
         columns = values.reshape(len(values), -1).astype(np.float64)
         if not may_move(name, columns.shape[1]):
             continue
         moving = columns[:, [i for i in range(columns.shape[1]) if _moves(columns[:, i])]]
-        clocks = all(is_clock(name, column, times) for column in moving.T)
-        if not clocks and not _follows(columns, motion):
-            found[name] = float(np.nanmin(moving)), float(np.nanmax(moving))
+        said, at = name, times
+        if len(columns) != len(motion):
+            if not _is_series(name, moving, others):
+                continue
+            said = f"{name} ({len(columns)} frames, beside {len(motion)})"
+            at = np.linspace(times[0], times[-1], len(columns))
+            columns = np.column_stack([np.interp(times, at, own) for own in columns.T])
+        clocks = all(is_clock(name, column, at) for column in moving.T)
+        if not clocks and (_of_another(name, called) or not _follows(columns, motion)):
+            found[said] = float(np.nanmin(moving)), float(np.nanmax(moving))
     return found
+
+
+def _is_series(name: str, moving: np.ndarray, others: Arrays) -> bool:
+    """Whether an array that is not as long as the motion was recorded at a rate of its own.
+
+    It has times of its own, or is long and changes as what moves does; matrices and tables do not.
+    """
+    for other, values in others.items():
+        if other != name and values.shape == moving.shape[:1] and tells_time(other, values):
+            return True
+    through = np.abs(np.diff(moving, axis=0)).sum(axis=0) <= _BENDS * np.ptp(moving, axis=0)
+    return len(moving) >= _FEWEST and bool(np.all(through))
+
+
+def _of_another(name: str, called: Sequence[str]) -> bool:
+    """Whether an array is by its name of another arm than the motion: the right one's."""
+    own, of_motion = sides(name), {side for one in called for side in sides(one)}
+    return bool(own - of_motion) and bool(of_motion or own & {"left", "right"})
+
+
+def sides(name: str) -> set[str]:
+    """Return which of several arms a name says that it is of: `left`, `r`, `robot1`."""
+    spaced = re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower()
+    return {match.group().replace("_", "") for match in _SIDE.finditer(spaced)}
 
 
 def may_move(name: str, width: int) -> bool:
@@ -297,7 +349,7 @@ def _moves(values: Times) -> bool:
 
 
 def _follows(values: np.ndarray, motion: Positions) -> bool:
-    """Whether columns are another reading of the motion's: in another unit, from another zero."""
+    """Whether columns are another reading of the motion's: in another unit, or a command."""
     width, most = values.shape[1], motion.shape[1]
     if width > most and width % most == 0:  # several vectors under one name
         return all(_follows(values[:, k :: width // most], motion) for k in range(width // most))
@@ -311,10 +363,11 @@ def _follows(values: np.ndarray, motion: Positions) -> bool:
         for delay in sorted(delays.tolist(), key=abs):
             one = values[max(0, delay) : len(values) + min(0, delay)]
             two = own[max(0, -delay) : len(own) - max(0, delay)]
-            one, two = one - one.mean(axis=0), two - two.mean(axis=0)
             spread = np.std(two, axis=0)
             spread = np.maximum(spread, np.median(spread))
             for scale in _SCALES:
-                if np.all(np.std(one - scale * two, axis=0) <= _SAME * scale * spread):
+                apart = one - scale * two
+                near = np.abs(apart.mean(axis=0)) <= _OTHER_ZERO * scale * spread
+                if np.all(near & (np.std(apart, axis=0) <= _SAME * scale * spread)):
                     return True
     return False
