@@ -146,7 +146,7 @@ SWUNG = Q[0] + 0.9 * (Q - Q[0])
         ("q_izquierda", "q_derecha", SWUNG, True),
         ("robot0_joint_pos", "robot1_joint_pos", SWUNG, True),
         ("q", "right/q", SWUNG, True),
-        ("q", "other", SWUNG + [-0.4, 0, 0], True),
+        ("q", "other", SWUNG + np.array([-0.4, 0, 0]), True),
         ("q_left", "q_left_cmd", LATE, False),
         ("q_left", "target", LATE, False),
         ("q", "q_r", LATE, False),

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import re
 from functools import partial
 from pathlib import Path
@@ -64,11 +65,12 @@ def _demo(
         key = keys[0]
         arrays = {name: _motion(path, group, name) for name in keys}
         count = len(arrays[key])
-        # Whatever has as many frames, and may move, tell the time, or mark what is padding.
+        # Whatever may move, at any rate, or tells the time of the frames, or marks what is padding.
         there = {
             name: _numbers(path, name, _own(path, group, name))
             for name, own in _shapes(group).items()
-            if own[0] == count and (len(own) == 1 or (len(own) == 2 and may_move(name, own[1])))
+            if len(own) <= 2
+            if (own[0] == count and len(own) == 1) or may_move(name, math.prod(own[1:]))
         } | arrays
         texts, stated = _said(path, top, group, key)
         stated |= {n: np.asarray(v) for n, v in made_by.items() if isinstance(v, (int, float))}
