@@ -9,26 +9,31 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from prior_reinforce.arm.recordings.bounds import check_names
 from prior_reinforce.arm.recordings.clock import (
     NO_COLUMN,
     Clock,
     Times,
     clock_among,
+    declared_rate,
+    rises,
     says_time,
     tells_time,
 )
-from prior_reinforce.arm.recordings.naming import missing_channels, vectors
+from prior_reinforce.arm.recordings.naming import Texts, missing_channels, said_in, vectors
 from prior_reinforce.arm.recordings.recording import (
     Positions,
     Recording,
     recorded,
     without_units,
 )
+from prior_reinforce.arm.recordings.tables import Table
 from prior_reinforce.arm.recordings.units import (
     CHANNEL_UNITS,
     SECONDS,
@@ -46,8 +51,6 @@ if TYPE_CHECKING:
     from prior_reinforce.arm.recordings.options import ReadOptions
 
 Arrays = Mapping[str, np.ndarray]
-Texts = Mapping[str, tuple[str, ...]]
-"""Texts of a file, by what it calls them."""
 _MOST_BESIDE = 64
 """Numbers a frame of what may be a part of the motion; ours: two hands have fewer, a lidar more."""
 _NAMES = re.compile(r"name|joint|dof|motor|actuator|channel|column|label|ax[ei]s", re.IGNORECASE)
@@ -66,6 +69,10 @@ _FRAMES = re.compile(
 _MASK = re.compile(
     r"((is|frame|attention|episode)_)?(pad|padded|padding|valid|masks?|(pad|padding|valid)_mask)"
 )
+_UNIT = re.compile(r"((joint|angle|angular|position|motion|rotation)s?_?)?units?", re.IGNORECASE)
+"""What the joints' units are called among others, deep in what a file says of itself."""
+_MOST_SAID = 1_000_000
+"""Bytes of a JSON beside a table at most. Ours: it says what the columns are."""
 _SAME, _SHIFTS = 0.3, 21
 """Part of its spread by which a reading may differ from another, and delays that are tried, up to a
 fifth of the recording either way. Ours: a command differs by what a controller lags behind."""
@@ -82,8 +89,8 @@ _SIDE = re.compile(
 _FEWEST, _BENDS = 20, 6
 """Frames of what moves at a rate of its own and has no times, and how often it goes through its
 range at most; ours: tables of other things jump."""
-_SAME_CLOCK = 0.01
-"""Share by which two clocks of a recording differ at most. Ours."""
+_SAME_CLOCK, _SAME_RATE = 0.01, 0.05
+"""Shares by which two clocks, and two rates, of a recording differ at most. Ours."""
 
 
 def recorded_among(
@@ -106,7 +113,8 @@ def recorded_among(
     if they are known.
     """
     count = len(arrays[keys[0]])
-    kept, why = frames_said(f"{where}: {episode}", keys[0], {**(stated or {}), **arrays}, count)
+    stated = with_rate(where, stated or {}, options.rate)
+    kept, why = frames_said(f"{where}: {episode}", keys[0], {**stated, **arrays}, count)
     arrays = {n: a[:kept] if a.shape[:1] == (count,) else a for n, a in arrays.items()}
     positions, known = joined(where, keys, arrays, texts, options.joints)
     bare, units = without_units(names or known)
@@ -201,6 +209,8 @@ def units_said(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
     for key, own in texts.items():
         if "unit" not in key.lower() or says_time(key) or len(own) not in (1, len(names)):
             continue
+        if "." in key and (_OTHER_NAMES.search(key) or not _UNIT.fullmatch(key.split(".")[-1])):
+            continue
         units = [unit if unit in CHANNEL_UNITS else None for unit in map(known_unit, own)]
         if len(own) == 1 and units[0] is not None:
             units = one_for_all(units[0], names)
@@ -209,17 +219,56 @@ def units_said(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
     return (None,) * len(names)
 
 
-def words(said: Any) -> tuple[str, ...]:
-    """Return the texts of an array, or of one text that lists several; none if they are none."""
-    listed = said.ravel().tolist() if isinstance(said, np.ndarray) else said
-    found = list(listed) if isinstance(listed, (list, tuple)) else [listed]
-    found = [t.decode(errors="replace") if isinstance(t, bytes) else t for t in found]
-    if not all(isinstance(text, str) for text in found):
-        return ()
-    if len(found) == 1:
-        text = found[0].strip().strip("[]()")
-        found = text.split(",") if "," in text else text.split()
-    return tuple(str(text).strip().strip("'\"") for text in found)
+def with_rate(
+    where: object, stated: Mapping[str, Any], given: float | None = None
+) -> dict[str, Any]:
+    """Return a file's numbers, and by its bare name the rate among those deep in it: `meta.fps`.
+
+    FileFormatError where it states two, and none is given.
+    """
+    places = {name: name.rpartition(".")[2] for name in stated if not _OTHER_NAMES.search(name)}
+    rates = {
+        name: declared_rate(where, {bare: stated[name]})["own_rate"]
+        for name, bare in places.items()
+        if ("." in name or np.size(stated[name]) == 1)
+        and declared_rate(where, {bare: stated[name]})
+    }
+    deep = [name for name in rates if "." in name]
+    for name, rate in rates.items():
+        first, of_first = next(iter(rates.items()))
+        if deep and given is None and abs(rate - of_first) > _SAME_RATE * of_first:
+            raise FileFormatError(
+                f"{where}: {first} says {of_first:.4g} frames a second, but {name} {rate:.4g}; "
+                "take one: --rate"
+            )
+    own = {places[name]: stated[name] for name in deep[:1] if len(rates) == len(deep)}
+    return {**stated, **own}
+
+
+def headed(table: Table, joints: Sequence[str] | None = None) -> Table:
+    """Return a table without heads under those that a JSON beside it gives to its columns.
+
+    It is called as the table, or is the only one of the folder. Names of all columns but the first
+    are taken if that one rises, as times do.
+    """
+    path = Path(table.where)
+    found = [path.with_suffix(".json")]
+    if not table.named and not found[0].is_file():
+        found = [p for p in path.parent.glob("*.json") if not p.with_suffix(path.suffix).exists()]
+    if table.named or len(found) != 1 or found[0].stat().st_size > _MOST_SAID:
+        return table
+    texts = said_in({"": found[0].read_bytes()})[0]
+    names = names_said(found[0], texts, len(table.names), joints)
+    if not names and len(table) and rises(table.stamps(0)):
+        names = names_said(found[0], texts, len(table.names) - 1, joints)
+        names = ("t", *names) if names else ()
+    if not names:
+        return table
+    check_names(found[0], names)
+    bare = [name for name in names if not says_time(name)]
+    said = iter(units_said({f".{key}": own for key, own in texts.items()}, bare))
+    units = tuple(None if says_time(name) else next(said) for name in names)
+    return replace(table, names=names, units=units, named=True)
 
 
 def frames_said(

@@ -17,9 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import may_move, recorded_among, words
+from prior_reinforce.arm.recordings.beside import may_move, recorded_among
 from prior_reinforce.arm.recordings.bounds import MOST_COLUMNS, check_numbers
 from prior_reinforce.arm.recordings.clock import Stamps
+from prior_reinforce.arm.recordings.naming import said_in
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     Episodes,
@@ -105,8 +106,13 @@ def _said(
                 value = np.asarray(within[name])
                 if value.dtype.kind in "biuf":
                     stated.setdefault(name, value)
-                elif len(text := words(value)) > 1 or node == own:
-                    texts.setdefault(name, text)
+                    continue
+                of_text, numbers = said_in({name: value})
+                for place, text in of_text.items():
+                    if len(text) > 1 or node == own:
+                        texts.setdefault(place, text)
+                for place, number in numbers.items():
+                    stated.setdefault(place, np.asarray(number))
     return texts, stated
 
 

@@ -17,9 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import may_move, recorded_among, words
+from prior_reinforce.arm.recordings.beside import may_move, recorded_among
 from prior_reinforce.arm.recordings.bounds import check_bytes, check_chunks, check_numbers
 from prior_reinforce.arm.recordings.clock import Stamps
+from prior_reinforce.arm.recordings.naming import said_in
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import Episodes, Recording, named_damage
 from prior_reinforce.errors import FileFormatError
@@ -78,7 +79,8 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             or (frames == count and (not width or (len(width) == 1 and may_move(name, width[0]))))
         }
         nodes = (group[f"data/{keys[0]}"], group["data"], group)
-        texts = {name: words(said) for node in nodes[::-1] for name, said in node.attrs.items()}
+        texts, stated = said_in({n: said for node in nodes[::-1] for n, said in node.attrs.items()})
+        stated = {f".{name}": number for name, number in stated.items()}  # of all episodes: a rate
     if ends.size == 0:
         raise FileFormatError(f"{source} holds no episode; copy the store again")
     starts = np.concatenate([[0], ends[:-1]])
@@ -91,7 +93,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
 
         def one(episode: str = str(number), start: int = start, end: int = end) -> Recording:
             own = {name: array[start:end] for name, array in numbers.items()}
-            return recorded_among(source, episode, keys, own, options, texts=texts)
+            return recorded_among(source, episode, keys, own, options, texts=texts, stated=stated)
 
         yield str(number), one
 
