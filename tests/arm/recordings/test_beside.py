@@ -50,6 +50,7 @@ def test_texts_that_contradict_each_other_are_refused():
     ("stated", "given", "rate"),
     [
         ({"meta.fps": 50}, None, {"fps": 50}),
+        ({"meta.frame_rate": 50}, None, {"frame_rate": 50}),
         ({"meta.timing.dt_ms": 20.0}, None, {"dt_ms": 20.0}),
         ({"meta.fps": 50, "rate": np.array(50.0)}, None, {"rate": 50.0}),
         ({"meta.fps": 50, "meta.camera.fps": 30}, None, {"fps": 50}),
@@ -178,6 +179,7 @@ SWUNG = Q[0] + 0.9 * (Q - Q[0])
         ("q_left", "q_left_cmd", LATE, False),
         ("q_left", "target", LATE, False),
         ("q", "q_r", LATE, False),
+        ("follower_1", "leader_1", LATE, False),
         ("q", "brightness", LATE, False),
         ("robot0_joint_pos", "robot0_target", np.rad2deg(LATE), False),
     ],

@@ -406,7 +406,8 @@ def test_a_json_beside_a_table_without_heads_names_its_columns(tmp_path, json_na
     t, q = sampled(0, 100)
     np.savetxt(tmp_path / "throw_0.csv", np.column_stack([t, q[:, ::-1]]), delimiter=",")
     names = [*["t"] * time, *JOINTS[::-1]]
-    said = json.dumps({"robot": {"columns": names}, "units": "rad", "rows": 3})
+    units = ["s", *["rad"] * 7] if json_name == "columns.json" else "rad"
+    said = json.dumps({"robot": {"columns": names}, "units": units, "rows": 3})
     (tmp_path / json_name).write_text(said)
     (recording,) = read_recordings(tmp_path / "throw_0.csv", joints=JOINTS)
     assert (recording.names, recording.clock) == (JOINTS, "t in s")

@@ -199,6 +199,13 @@ def test_the_metadata_of_another_program_is_searched_for_names_and_the_rate(tmp_
     (recording,) = read_recordings(tmp_path / "a.npz", joints=JOINTS)
     assert recording.names == JOINTS[::-1]
     assert recording.clock == "fps in the file"
+    t = np.arange(len(q)) / 100
+    np.savez(tmp_path / "c.npz", t=t, q=q, metadata=json.dumps(said))
+    with pytest.raises(FileFormatError, match=r"but fps 50; take one: --time-column t, or --time"):
+        read_recordings(tmp_path / "c.npz")
+    assert read_recordings(tmp_path / "c.npz", time_column="t")[0].period == pytest.approx(0.01)
+    (given,) = read_recordings(tmp_path / "c.npz", time_column="none", rate=50)
+    assert given.period == pytest.approx(0.02)
     np.savez(tmp_path / "b.npz", q=q, metadata="by kim, in the evening", rate=50)
     assert not read_recordings(tmp_path / "b.npz")[0].named
 

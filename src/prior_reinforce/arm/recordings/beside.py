@@ -82,7 +82,7 @@ _OTHER_ZERO = 1.0
 """Part of its spread by which a command lies beside the motion at most, as under a load. Ours; what
 starts from another pose is another arm."""
 _SIDE = re.compile(
-    r"(?<!b)right|left|izq|der(?=ech)|gauche|droite?|(robot|arm|hand|gripper|follower|leader)_?\d+"
+    r"(?<!b)right|left|izq|der(?=ech)|gauche|droite?|(robot|arm|hand|gripper)_?\d+"
     r"|(?<![a-z])[lr](?![a-z])"
 )
 """Which of two arms a name is of."""
@@ -113,7 +113,8 @@ def recorded_among(
     if they are known.
     """
     count = len(arrays[keys[0]])
-    stated = with_rate(where, stated or {}, options.rate)
+    stated = stated or {}
+    stated = stated if options.time_column else with_rate(where, stated, options.rate)
     kept, why = frames_said(f"{where}: {episode}", keys[0], {**stated, **arrays}, count)
     arrays = {n: a[:kept] if a.shape[:1] == (count,) else a for n, a in arrays.items()}
     positions, known = joined(where, keys, arrays, texts, options.joints)
@@ -226,7 +227,8 @@ def with_rate(
 
     FileFormatError where it states two, and none is given.
     """
-    places = {name: name.rpartition(".")[2] for name in stated if not _OTHER_NAMES.search(name)}
+    split = {name: name.rpartition(".") for name in stated}
+    places = {n: bare for n, (at, _, bare) in split.items() if not _OTHER_NAMES.search(at)}
     rates = {
         name: declared_rate(where, {bare: stated[name]})["own_rate"]
         for name, bare in places.items()
@@ -265,9 +267,11 @@ def headed(table: Table, joints: Sequence[str] | None = None) -> Table:
     if not names:
         return table
     check_names(found[0], names)
-    bare = [name for name in names if not says_time(name)]
-    said = iter(units_said({f".{key}": own for key, own in texts.items()}, bare))
-    units = tuple(None if says_time(name) else next(said) for name in names)
+    texts = {f".{key}": own for key, own in texts.items()}
+    units = units_said(texts, names)
+    if not any(units):  # of the columns but the time's
+        units = (None, *units_said(texts, names[1:]))
+    units = tuple(None if says_time(n) else u for n, u in zip(names, units, strict=True))
     return replace(table, names=names, units=units, named=True)
 
 

@@ -36,6 +36,8 @@ _KEYS = ("obs/robot0_joint_pos", "obs/agent/qpos", "observations/qpos")
 """Measured positions of the first arm; `actions` are mostly pose increments or targets."""
 _MOST_BESIDE, _MOST_BYTES_OF_NAMES = 64, 100_000
 """Members of a group that is looked through for names, and bytes of these."""
+_MOST_AT_OWN_RATE = 1_000_000
+"""Numbers of what moves at another rate than the motion. Ours: sound has more."""
 _EPISODE = re.compile(r"(demo|traj|episode)_?\d+")
 
 
@@ -70,7 +72,7 @@ def _demo(
         there = {
             name: _numbers(path, name, _own(path, group, name))
             for name, own in _shapes(group).items()
-            if len(own) <= 2
+            if len(own) <= 2 and (own[0] == count or math.prod(own) <= _MOST_AT_OWN_RATE)
             if (own[0] == count and len(own) == 1) or may_move(name, math.prod(own[1:]))
         } | arrays
         texts, stated = _said(path, top, group, key)
