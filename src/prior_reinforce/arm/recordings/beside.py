@@ -371,7 +371,7 @@ def sides(name: str) -> set[str]:
     return {match.group().replace("_", "") for match in _SIDE.finditer(spaced)}
 
 
-def may_move(name: str, width: int) -> bool:
+def may_move(name: str, width: int = 1) -> bool:
     """Whether an array of so many numbers a frame could be a part of the motion, by its name."""
     own = name.rpartition("/")[2]
     no_motion = says_no_position(own) or says_time(own) or _MASK.fullmatch(own)
