@@ -10,8 +10,9 @@ from prior_reinforce.arm.recordings.beside import (
     moves_beside,
     names_said,
     units_said,
-    words,
+    with_rate,
 )
+from prior_reinforce.arm.recordings.naming import words
 from prior_reinforce.errors import FileFormatError
 
 T = np.arange(101) / 50
@@ -46,11 +47,39 @@ def test_texts_that_contradict_each_other_are_refused():
 
 
 @pytest.mark.parametrize(
+    ("stated", "given", "rate"),
+    [
+        ({"meta.fps": 50}, None, {"fps": 50}),
+        ({"meta.frame_rate": 50}, None, {"frame_rate": 50}),
+        ({"meta.timing.dt_ms": 20.0}, None, {"dt_ms": 20.0}),
+        ({"meta.fps": 50, "rate": np.array(50.0)}, None, {"rate": 50.0}),
+        ({"meta.fps": 50, "meta.camera.fps": 30}, None, {"fps": 50}),
+        ({"meta.fps": 50, "meta.robot.hz": 100}, 50.0, {"fps": 50}),
+        ({"meta.version": 2}, None, {}),
+    ],
+)
+def test_a_rate_deep_in_what_a_file_says_is_its_rate(stated, given, rate):
+    assert {k: v for k, v in with_rate("a.npz", stated, given).items() if "." not in k} == rate
+
+
+def test_two_rates_that_contradict_each_other_are_refused():
+    stated = {"meta.fps": 50, "meta.robot.dt": 0.01}
+    with pytest.raises(
+        FileFormatError, match=r"meta\.fps says 50 .*, but meta\.robot\.dt 100; .*-r"
+    ):
+        with_rate("a.npz", stated)
+    with pytest.raises(FileFormatError, match=r"rate says 20 .*, but meta\.fps 50"):
+        with_rate("a.npz", {"rate": np.array(20), "meta.fps": 50})
+
+
+@pytest.mark.parametrize(
     ("texts", "units"),
     [
         ({"units": ("deg", "deg", "mm")}, ("deg", "deg", "mm")),
         ({"q_unit": ("°",)}, ("deg", "deg", None)),
         ({"time_unit": ("ms",)}, (None,) * 3),
+        ({"meta.units": ("deg",)}, ("deg", "deg", None)),
+        ({"meta.outcome_units": ("m",), "meta.object.unit": ("m",)}, (None,) * 3),
         ({"units": ("deg", "deg", "counts")}, ("deg", "deg", None)),
     ],
 )
@@ -130,6 +159,52 @@ LATE = Q[np.maximum(np.arange(101) - 4, 0)]
 )
 def test_what_moves_beside_is_told_by_its_numbers(name, values, moves):
     assert ([*moves_beside(Q, {name: values}, T)] == [name]) == moves
+
+
+SWUNG = Q[0] + 0.9 * (Q - Q[0])
+"""As another arm that moves in parallel, from the same pose."""
+
+
+@pytest.mark.parametrize(
+    ("motion", "name", "values", "moves"),
+    [
+        ("q_left", "q_right", SWUNG, True),
+        ("q_left", "q_right", Q, True),
+        ("qLeft", "qRight", SWUNG, True),
+        ("q_l", "q_r", SWUNG, True),
+        ("q_izquierda", "q_derecha", SWUNG, True),
+        ("robot0_joint_pos", "robot1_joint_pos", SWUNG, True),
+        ("q", "right/q", SWUNG, True),
+        ("q", "other", SWUNG + np.array([-0.4, 0, 0]), True),
+        ("q_left", "q_left_cmd", LATE, False),
+        ("q_left", "target", LATE, False),
+        ("q", "q_r", LATE, False),
+        ("follower_1", "leader_1", LATE, False),
+        ("q", "brightness", LATE, False),
+        ("robot0_joint_pos", "robot0_target", np.rad2deg(LATE), False),
+    ],
+)
+def test_another_arm_in_parallel_is_no_command(motion, name, values, moves):
+    assert bool(moves_beside(Q, {name: values}, T, [motion])) == moves
+
+
+@pytest.mark.parametrize(
+    ("others", "moves"),
+    [
+        ({"gripper": 80 - 70 * S[::3], "t_gripper": T[::3]}, True),
+        ({"gripper": 80 - 70 * S[::8], "t_gripper": T[::8]}, True),
+        ({"gripper": 80 - 70 * S[::3]}, True),
+        ({"grip": S[::3] > 0.5}, True),
+        ({"q_cmd": LATE[::3]}, False),
+        ({"chrono": 7 + T[::3], "n": np.arange(34), "t_gripper": T[::3]}, False),
+        ({"home": Q[0], "limits": np.array([[-1.0, 1.0]] * 3), "gains": 1 + S[::8]}, False),
+        ({"points": np.random.default_rng(0).normal(size=(60, 3))}, False),
+    ],
+)
+def test_what_moves_at_a_rate_of_its_own_is_named(others, moves):
+    found = moves_beside(Q, others, T)
+    assert bool(found) == moves
+    assert not moves or all(f"({len(next(iter(others.values())))} frames" in name for name in found)
 
 
 def test_numbered_columns_beside_are_one_group():

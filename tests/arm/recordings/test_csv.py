@@ -1,5 +1,7 @@
 """CSV files come back as the motions that were written, and say what is wrong with them."""
 
+import json
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -474,3 +476,26 @@ def test_the_take_whose_times_are_in_another_unit_is_named(tmp_path):
     with pytest.raises(UnclearUnitsError, match=r"t0, t2: time in ms, as --time-unit") as asked:
         read_recordings(tmp_path, time_unit="ms")
     assert "--leave-out t1" in asked.value.options
+
+
+@pytest.mark.parametrize("json_name", ["throw_0.json", "columns.json"])
+@pytest.mark.parametrize("time", [True, False])
+def test_a_json_beside_a_table_without_heads_names_its_columns(tmp_path, json_name, time):
+    t, q = sampled(0, 100)
+    np.savetxt(tmp_path / "throw_0.csv", np.column_stack([t, q[:, ::-1]]), delimiter=",")
+    names = [*["t"] * time, *JOINTS[::-1]]
+    units = ["s", *["rad"] * 7] if json_name == "columns.json" else "rad"
+    said = json.dumps({"robot": {"columns": names}, "units": units, "rows": 3})
+    (tmp_path / json_name).write_text(said)
+    (recording,) = read_recordings(tmp_path / "throw_0.csv", joints=JOINTS)
+    assert (recording.names, recording.clock) == (JOINTS, "t in s")
+    assert set(recording.units) == {"rad"}
+    np.testing.assert_array_equal(recording.positions, q)
+
+
+def test_a_json_of_another_table_names_no_columns(tmp_path):
+    np.savetxt(tmp_path / "throw_0.csv", sampled(0, 100)[1], delimiter=",")
+    np.savetxt(tmp_path / "throw_1.csv", sampled(1, 100)[1], delimiter=",")
+    (tmp_path / "throw_1.json").write_text(json.dumps({"columns": JOINTS[::-1]}))
+    zero, one = read_recordings(tmp_path, rate=100, joints=JOINTS)
+    assert (zero.named, one.named) == (False, True)

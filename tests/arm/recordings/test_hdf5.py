@@ -1,5 +1,7 @@
 """robomimic data sets, and what ALOHA and ManiSkill write."""
 
+import json
+
 import h5py
 import numpy as np
 import pytest
@@ -200,3 +202,21 @@ def test_what_moves_is_named_by_what_it_is_and_not_by_a_word_in_its_path(tmp_pat
     (recording,) = read_recordings(path, key="observation/robot_state/joint_positions", rate=20)
     named = {"obs/gripper_states", "observation/robot_state/gripper_position"}
     assert {*recording.left_out} == named
+
+
+def test_a_json_in_an_attribute_names_the_joints_and_the_rate(tmp_path):
+    with h5py.File(tmp_path / "throw.hdf5", "w") as file:
+        file["observations/qpos"] = sampled(0, 50)[1][:, ::-1]
+        file.attrs["metadata"] = json.dumps({"joint_names": JOINTS[::-1], "fps": 50, "by": "kim"})
+    (recording,) = read_recordings(tmp_path / "throw.hdf5", joints=JOINTS)
+    assert (recording.names, recording.clock) == (JOINTS[::-1], "fps in the file")
+    assert not recording.ambiguities
+
+
+def test_what_moves_at_a_rate_of_its_own_is_named(tmp_path):
+    with h5py.File(tmp_path / "throw.hdf5", "w") as file:
+        _, file["observations/qpos"] = sampled(0, 50)
+        file["gripper/width"] = 80 + 100 * sampled(0, 20)[1][:, 1]
+        file["home"] = sampled(0, 50)[1][0]
+    (recording,) = read_recordings(tmp_path / "throw.hdf5", rate=50)
+    assert [*recording.left_out] == ["gripper/width (35 frames, beside 86)"]

@@ -1,5 +1,8 @@
 """Recorded channels are found by the gate's rule, in both directions, and never guessed."""
 
+import json
+
+import numpy as np
 import pytest
 
 from prior_reinforce.arm.recordings.naming import (
@@ -7,6 +10,7 @@ from prior_reinforce.arm.recordings.naming import (
     joint_vectors,
     missing_channels,
     numbered_like,
+    said_in,
     vectors,
 )
 from prior_reinforce.errors import InvalidDemonstrationsError
@@ -92,3 +96,31 @@ def test_what_says_nothing_else_may_be_positions(stem):
     assert numbered_like([f"joint{i}" for i in range(1, 7)], there) == tuple(there)
     assert list(joint_vectors(there, 6).values()) == [list(range(6))]
     assert joint_vectors(there, 7) == {}
+
+
+NAMES = ("elbow", "pan", "lift")
+
+
+@pytest.mark.parametrize(
+    ("said", "place"),
+    [
+        ({"meta": {"robot": {"joint_names": [*NAMES]}}}, "meta.robot.joint_names"),
+        ({"meta": json.dumps({"names": NAMES, "fps": 50})}, "meta.names"),
+        ({"meta": np.array(json.dumps({"names": NAMES}))}, "meta.names"),
+        ({"meta": np.array([json.dumps({"names": NAMES}).encode()])}, "meta.names"),
+        ({"joints": json.dumps(NAMES)}, "joints"),
+        ({"m": {"joints": [{"name": n, "unit": "rad"} for n in NAMES]}}, "m.joints.name"),
+        ({"m": {"columns": {"pan": 1, "lift": 2, "elbow": 0}}}, "m.columns"),
+        ({"m": {"inner": json.dumps({"order": "elbow pan lift"})}}, "m.inner.order"),
+    ],
+)
+def test_names_are_found_in_what_a_file_says_however_deep(said, place):
+    assert said_in(said)[0][place] == NAMES
+
+
+def test_numbers_are_found_and_what_cannot_be_parsed_is_none():
+    texts, numbers = said_in(
+        {"meta": {"a": {"fps": 50}, "b": True}, "x": "{half", "y": "[" * 10**5}
+    )
+    assert numbers == {"meta.a.fps": 50}
+    assert "x" not in texts

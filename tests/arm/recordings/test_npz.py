@@ -1,5 +1,7 @@
 """NPZ files come back as the motions that were written, and say what is wrong with them."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -188,3 +190,32 @@ def test_names_of_some_columns_are_asked_about_in_the_files_order(tmp_path):
     units = ["deg" if name == "joint3" else "rad" for name in said]
     chosen = select([recording], said, plan, units).recordings[0].positions[:, :7]
     np.testing.assert_allclose(chosen, np.where(np.arange(7) == 2, np.deg2rad(q), q))
+
+
+def test_the_metadata_of_another_program_is_searched_for_names_and_the_rate(tmp_path):
+    _, q = sampled(0, 50)
+    said = {"robot": {"joint_names": JOINTS[::-1]}, "timing": {"fps": 50}, "operator": "kim"}
+    np.savez(tmp_path / "a.npz", q=q[:, ::-1], metadata=json.dumps(said))
+    (recording,) = read_recordings(tmp_path / "a.npz", joints=JOINTS)
+    assert recording.names == JOINTS[::-1]
+    assert recording.clock == "fps in the file"
+    t = np.arange(len(q)) / 100
+    np.savez(tmp_path / "c.npz", t=t, q=q, metadata=json.dumps(said))
+    with pytest.raises(FileFormatError, match=r"but fps 50; take one: --time-column t, or --time"):
+        read_recordings(tmp_path / "c.npz")
+    assert read_recordings(tmp_path / "c.npz", time_column="t")[0].period == pytest.approx(0.01)
+    (given,) = read_recordings(tmp_path / "c.npz", time_column="none", rate=50)
+    assert given.period == pytest.approx(0.02)
+    np.savez(tmp_path / "b.npz", q=q, metadata="by kim, in the evening", rate=50)
+    assert not read_recordings(tmp_path / "b.npz")[0].named
+
+
+def test_a_gripper_at_a_rate_of_its_own_is_named_and_what_to_do_about_it(tmp_path):
+    t, q = sampled(0, 100)
+    np.savez(tmp_path / "a.npz", t=t, q=q, t_gripper=t[::5], gripper=80 - 100 * q[::5, 1])
+    (recording,) = read_recordings(tmp_path / "a.npz")
+    assert [*recording.left_out] == [f"gripper ({len(t[::5])} frames, beside {len(t)})"]
+    with pytest.raises(
+        FileFormatError, match=r"gripper has \d+; .* at the times of q: numpy\.interp"
+    ):
+        read_recordings(tmp_path / "a.npz", key=["q", "gripper"])

@@ -2,13 +2,14 @@
 
 import contextlib
 import sqlite3
+import struct
 
 import numpy as np
 import pytest
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
 from prior_reinforce.errors import FileFormatError
@@ -189,6 +190,89 @@ def test_a_topic_with_two_publishers(tmp_path, kind, case):
     (recording,) = read_recordings(bag, joints=JOINTS)
     np.testing.assert_allclose(recording.positions[:, :7], sampled(0, 20)[1])
     assert any("messages" in remark for remark in recording.remarks)
+
+
+TYPES = {
+    "example_interfaces/msg/Float64": "float64 data",
+    "lift_msgs/msg/State": "std_msgs/Header header\nfloat64 position\nfloat64 max_effort",
+    "lift_msgs/msg/Both": "float64 position\nfloat64 other",
+    "lift_msgs/msg/Speed": "float64 speed",
+    "geometry_msgs/msg/Point": None,
+}
+
+
+def with_lift(path, kind, say):
+    """A bag of a throw, and a topic of another type that says how high a lift is."""
+    t, q = sampled(0, 20)
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    if TYPES[kind] is not None:
+        store.register(get_types_from_msg(TYPES[kind], kind))
+    name = "sensor_msgs/msg/JointState"
+    header, time = store.types["std_msgs/msg/Header"], store.types["builtin_interfaces/msg/Time"]
+    with Writer2(path, version=8, storage_plugin=StoragePlugin.MCAP) as writer:
+        joints = writer.add_connection("/joint_states", name, typestore=store)
+        lift = writer.add_connection("/lift/height", kind, typestore=store)
+        for seconds, row in zip(t, q, strict=True):
+            at = 7 * 10**9 + round(seconds * 1e9)
+            stamp = time(sec=7 + int(seconds), nanosec=round(seconds % 1 * 1e9))
+            top = header(stamp=stamp, frame_id="")
+            message = store.types[name](
+                header=top, name=list(JOINTS), position=row, velocity=np.zeros(0),
+                effort=np.zeros(0),
+            )  # fmt: skip
+            writer.write(joints, at, store.serialize_cdr(message, name))
+            said = say(row[1])
+            said |= {"header": top} if "Header" in (TYPES[kind] or "") else {}
+            writer.write(lift, at + 9, store.serialize_cdr(store.types[kind](**said), kind))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("kind", "say", "named"),
+    [
+        ("example_interfaces/msg/Float64", lambda q: {"data": q}, "/lift/height"),
+        (
+            "lift_msgs/msg/State",
+            lambda q: {"position": q, "max_effort": 40.0},
+            "/lift/height/position",
+        ),
+        ("lift_msgs/msg/Both", lambda q: {"position": q, "other": 2 * q}, None),
+        ("lift_msgs/msg/Speed", lambda q: {"speed": q}, None),
+        ("geometry_msgs/msg/Point", lambda q: {"x": q, "y": 0.0, "z": 0.0}, None),
+    ],
+)
+def test_a_lift_in_messages_of_any_type_is_named_and_can_be_taken(tmp_path, kind, say, named):
+    bag = with_lift(tmp_path / "throw", kind, say)
+    (recording,) = read_recordings(bag)
+    assert [*recording.left_out] == ([named] if named else [])
+    assert not recording.remarks
+    if named:
+        (both,) = read_recordings(bag, key=["/joint_states", "/lift/height"])
+        np.testing.assert_allclose(
+            both.positions[:, both.names.index(named)], both.positions[:, 1], atol=1e-6
+        )
+
+
+def test_a_topic_whose_type_the_bag_does_not_describe_is_named(tmp_path):
+    bag = with_lift(
+        tmp_path / "throw", "lift_msgs/msg/State", lambda q: {"position": q, "max_effort": 40.0}
+    )
+    (file,) = bag.glob("*.mcap")
+    content = file.read_bytes()
+    file.write_bytes(content.replace(b"lift_msgs/msg/State", b"lift_msgs/msg/Stale"))
+    (recording,) = read_recordings(bag)
+    assert "not read: topics /lift/height (lift_msgs/msg/" in recording.remarks[0]
+
+
+def test_an_mcap_of_json_is_not_called_damaged(tmp_path):
+    channel = struct.pack("<HHI", 1, 0, 2) + b"/q" + struct.pack("<I", 4) + b"json" + bytes(4)
+    magic = b"\x89MCAP0\r\n"
+    start = struct.pack("<BQ", 1, 8) + bytes(8)
+    said = struct.pack("<BQ", 4, len(channel)) + channel
+    footer = struct.pack("<BQQQI", 2, 20, len(magic) + len(start), 0, 0)
+    (tmp_path / "throw.mcap").write_bytes(magic + start + said + footer + magic)
+    with pytest.raises(FileFormatError, match=r"its messages are JSON, .* as NPZ or CSV"):
+        read_recordings(tmp_path)
 
 
 @pytest.mark.parametrize("kind", ["ros1", "mcap"])

@@ -118,3 +118,24 @@ def test_attributes_name_the_joints_and_a_gripper_is_named(tmp_path):
     (first, *_) = read_recordings(path, key="joint_pos", rate=50, joints=JOINTS)
     assert first.names == JOINTS[::-1]
     assert [*first.left_out] == ["grip"]
+
+
+def test_attributes_name_the_joints_and_the_rate_however_deep(tmp_path):
+    path = write_zarr(tmp_path)
+    root = zarr.open_group(str(path), mode="r+")
+    root.attrs["info"] = {"robot": {"joint_names": [*JOINTS[::-1]]}, "fps": 50, "length": 9}
+    (first, *_) = read_recordings(path, key="joint_pos", joints=JOINTS)
+    assert (first.names, first.clock) == (JOINTS[::-1], "fps in the file")
+    root.attrs["more"] = {"joint_names": [*JOINTS]}
+    with pytest.raises(
+        FileFormatError, match=r"info\.robot\.joint_names says .* more\.joint_names"
+    ):
+        read_recordings(path, key="joint_pos", joints=JOINTS)
+
+
+def test_what_moves_at_a_rate_of_its_own_is_named(tmp_path):
+    path = write_zarr(tmp_path)
+    root = zarr.open_group(str(path), mode="r+")
+    root["data"].create_array("gripper", data=80 + 100 * root["data/joint_pos"][::2, 1])
+    (first, *_) = read_recordings(path, key="joint_pos", rate=50)
+    assert [name.split(" (")[0] for name in first.left_out] == ["gripper"]

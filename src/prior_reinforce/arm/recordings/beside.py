@@ -9,19 +9,31 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.clock import NO_COLUMN, Clock, Times, clock_among, says_time
-from prior_reinforce.arm.recordings.naming import missing_channels, vectors
+from prior_reinforce.arm.recordings.bounds import check_names
+from prior_reinforce.arm.recordings.clock import (
+    NO_COLUMN,
+    Clock,
+    Times,
+    clock_among,
+    declared_rate,
+    rises,
+    says_time,
+    tells_time,
+)
+from prior_reinforce.arm.recordings.naming import Texts, missing_channels, said_in, vectors
 from prior_reinforce.arm.recordings.recording import (
     Positions,
     Recording,
     recorded,
     without_units,
 )
+from prior_reinforce.arm.recordings.tables import Table
 from prior_reinforce.arm.recordings.units import (
     CHANNEL_UNITS,
     SECONDS,
@@ -39,8 +51,6 @@ if TYPE_CHECKING:
     from prior_reinforce.arm.recordings.options import ReadOptions
 
 Arrays = Mapping[str, np.ndarray]
-Texts = Mapping[str, tuple[str, ...]]
-"""Texts of a file, by what it calls them."""
 _MOST_BESIDE = 64
 """Numbers a frame of what may be a part of the motion; ours: two hands have fewer, a lidar more."""
 _NAMES = re.compile(r"name|joint|dof|motor|actuator|channel|column|label|ax[ei]s", re.IGNORECASE)
@@ -59,13 +69,28 @@ _FRAMES = re.compile(
 _MASK = re.compile(
     r"((is|frame|attention|episode)_)?(pad|padded|padding|valid|masks?|(pad|padding|valid)_mask)"
 )
+_UNIT = re.compile(r"((joint|angle|angular|position|motion|rotation)s?_?)?units?", re.IGNORECASE)
+"""What the joints' units are called among others, deep in what a file says of itself."""
+_MOST_SAID = 1_000_000
+"""Bytes of a JSON beside a table at most. Ours: it says what the columns are."""
 _SAME, _SHIFTS = 0.3, 21
 """Part of its spread by which a reading may differ from another, and delays that are tried, up to a
 fifth of the recording either way. Ours: a command differs by what a controller lags behind."""
 _SCALES = (1.0, TURN["deg"] / TURN["rad"], TURN["rad"] / TURN["deg"], 1000.0, 100.0, 0.01, 0.001)
 """Factors between readings in two units."""
-_SAME_CLOCK = 0.01
-"""Share by which two clocks of a recording differ at most. Ours."""
+_OTHER_ZERO = 1.0
+"""Part of its spread by which a command lies beside the motion at most, as under a load. Ours; what
+starts from another pose is another arm."""
+_SIDE = re.compile(
+    r"(?<!b)right|left|izq|der(?=ech)|gauche|droite?|(robot|arm|hand|gripper)_?\d+"
+    r"|(?<![a-z])[lr](?![a-z])"
+)
+"""Which of two arms a name is of."""
+_FEWEST, _BENDS = 20, 6
+"""Frames of what moves at a rate of its own and has no times, and how often it goes through its
+range at most; ours: tables of other things jump."""
+_SAME_CLOCK, _SAME_RATE = 0.01, 0.05
+"""Shares by which two clocks, and two rates, of a recording differ at most. Ours."""
 
 
 def recorded_among(
@@ -88,7 +113,9 @@ def recorded_among(
     if they are known.
     """
     count = len(arrays[keys[0]])
-    kept, why = frames_said(f"{where}: {episode}", keys[0], {**(stated or {}), **arrays}, count)
+    stated = stated or {}
+    stated = stated if options.time_column else with_rate(where, stated, options.rate)
+    kept, why = frames_said(f"{where}: {episode}", keys[0], {**stated, **arrays}, count)
     arrays = {n: a[:kept] if a.shape[:1] == (count,) else a for n, a in arrays.items()}
     positions, known = joined(where, keys, arrays, texts, options.joints)
     bare, units = without_units(names or known)
@@ -98,7 +125,8 @@ def recorded_among(
         declared = None if options.time_column == NO_COLUMN else stated
         clock = clock_among(where, episode, kept, arrays, options, declared)
     others = {name: array for name, array in arrays.items() if name not in keys}
-    more = {"left_out": moves_beside(positions, others, clock.times)} | more
+    called = (*keys, *(names or known))
+    more = {"left_out": moves_beside(positions, others, clock.times, called)} | more
     more["remarks"] = (*more.get("remarks", ()), *why)
     if not bare:
         unclear = _other_names(episode, texts, positions.shape[1], options.joints or ())
@@ -134,7 +162,10 @@ def joined(
     columns = [arrays[key] if arrays[key].ndim > 1 else arrays[key][:, None] for key in keys]
     if len({len(column) for column in columns}) > 1:
         each = ", ".join(f"{key} has {len(arrays[key])}" for key in keys)
-        raise FileFormatError(f"the arrays have different frames: {each}; take one of them")
+        raise FileFormatError(
+            f"the arrays have different frames: {each}; take one of them, or write the others at "
+            f"the times of {keys[0]}: numpy.interp(its times, their own times, their values)"
+        )
     widths = [column.shape[1] for column in columns]
     said = list(names_said(where, texts, sum(widths), joints))
     if len(keys) > 1 and not said:
@@ -179,6 +210,8 @@ def units_said(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
     for key, own in texts.items():
         if "unit" not in key.lower() or says_time(key) or len(own) not in (1, len(names)):
             continue
+        if "." in key and (_OTHER_NAMES.search(key) or not _UNIT.fullmatch(key.split(".")[-1])):
+            continue
         units = [unit if unit in CHANNEL_UNITS else None for unit in map(known_unit, own)]
         if len(own) == 1 and units[0] is not None:
             units = one_for_all(units[0], names)
@@ -187,17 +220,59 @@ def units_said(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
     return (None,) * len(names)
 
 
-def words(said: Any) -> tuple[str, ...]:
-    """Return the texts of an array, or of one text that lists several; none if they are none."""
-    listed = said.ravel().tolist() if isinstance(said, np.ndarray) else said
-    found = list(listed) if isinstance(listed, (list, tuple)) else [listed]
-    found = [t.decode(errors="replace") if isinstance(t, bytes) else t for t in found]
-    if not all(isinstance(text, str) for text in found):
-        return ()
-    if len(found) == 1:
-        text = found[0].strip().strip("[]()")
-        found = text.split(",") if "," in text else text.split()
-    return tuple(str(text).strip().strip("'\"") for text in found)
+def with_rate(
+    where: object, stated: Mapping[str, Any], given: float | None = None
+) -> dict[str, Any]:
+    """Return a file's numbers, and by its bare name the rate among those deep in it: `meta.fps`.
+
+    FileFormatError where it states two, and none is given.
+    """
+    split = {name: name.rpartition(".") for name in stated}
+    places = {n: bare for n, (at, _, bare) in split.items() if not _OTHER_NAMES.search(at)}
+    rates = {
+        name: declared_rate(where, {bare: stated[name]})["own_rate"]
+        for name, bare in places.items()
+        if ("." in name or np.size(stated[name]) == 1)
+        and declared_rate(where, {bare: stated[name]})
+    }
+    deep = [name for name in rates if "." in name]
+    for name, rate in rates.items():
+        first, of_first = next(iter(rates.items()))
+        if deep and given is None and abs(rate - of_first) > _SAME_RATE * of_first:
+            raise FileFormatError(
+                f"{where}: {first} says {of_first:.4g} frames a second, but {name} {rate:.4g}; "
+                "take one: --rate"
+            )
+    own = {places[name]: stated[name] for name in deep[:1] if len(rates) == len(deep)}
+    return {**stated, **own}
+
+
+def headed(table: Table, joints: Sequence[str] | None = None) -> Table:
+    """Return a table without heads under those that a JSON beside it gives to its columns.
+
+    It is called as the table, or is the only one of the folder. Names of all columns but the first
+    are taken if that one rises, as times do.
+    """
+    path = Path(table.where)
+    found = [path.with_suffix(".json")]
+    if not table.named and not found[0].is_file():
+        found = [p for p in path.parent.glob("*.json") if not p.with_suffix(path.suffix).exists()]
+    if table.named or len(found) != 1 or found[0].stat().st_size > _MOST_SAID:
+        return table
+    texts = said_in({"": found[0].read_bytes()})[0]
+    names = names_said(found[0], texts, len(table.names), joints)
+    if not names and len(table) and rises(table.stamps(0)):
+        names = names_said(found[0], texts, len(table.names) - 1, joints)
+        names = ("t", *names) if names else ()
+    if not names:
+        return table
+    check_names(found[0], names)
+    texts = {f".{key}": own for key, own in texts.items()}
+    units = units_said(texts, names)
+    if not any(units):  # of the columns but the time's
+        units = (None, *units_said(texts, names[1:]))
+    units = tuple(None if says_time(n) else u for n, u in zip(names, units, strict=True))
+    return replace(table, names=names, units=units, named=True)
 
 
 def frames_said(
@@ -239,34 +314,64 @@ def columns_beside(
     in_groups = {i for group in groups for i in group}
     groups += [[i] for i in others if i not in in_groups]
     arrays = {say_names([names[i] for i in group]): values[:, group] for group in groups}
-    return moves_beside(values[:, list(taken)], arrays, times)
+    return moves_beside(values[:, list(taken)], arrays, times, [names[i] for i in taken])
 
 
-def moves_beside(motion: Positions, others: Arrays, times: Times) -> dict[str, tuple[float, float]]:
-    """Return the range of each array of the same frames that moves and is not taken.
+def moves_beside(
+    motion: Positions, others: Arrays, times: Times, called: Sequence[str] = ()
+) -> dict[str, tuple[float, float]]:
+    """Return the range of each array that moves and is not taken, at the motion's rate or its own.
 
-    Not listed are clocks, other readings of the motion such as its commands, and what is named like
-    rates, forces, poses, or anything else that is no part of an arm.
+    `called` are names of the motion. Not listed are clocks, other readings of the motion such as
+    its commands, and what is named like rates, forces, poses, or anything else that is no part of
+    an arm.
     """
     found = {}
     for name, values in others.items():
-        if (
-            values.ndim not in (1, 2)
-            or len(values) != len(motion)
-            or values.dtype.kind not in "biuf"
-        ):
+        if values.ndim not in (1, 2) or values.dtype.kind not in "biuf" or not values.size:
             continue
         columns = values.reshape(len(values), -1).astype(np.float64)
         if not may_move(name, columns.shape[1]):
             continue
         moving = columns[:, [i for i in range(columns.shape[1]) if _moves(columns[:, i])]]
-        clocks = all(is_clock(name, column, times) for column in moving.T)
-        if not clocks and not _follows(columns, motion):
-            found[name] = float(np.nanmin(moving)), float(np.nanmax(moving))
+        said, at = name, times
+        if len(columns) != len(motion):
+            if not _is_series(name, moving, others):
+                continue
+            said = f"{name} ({len(columns)} frames, beside {len(motion)})"
+            at = np.linspace(times[0], times[-1], len(columns))
+            columns = np.column_stack([np.interp(times, at, own) for own in columns.T])
+        clocks = all(is_clock(name, column, at) for column in moving.T)
+        if not clocks and (_of_another(name, called) or not _follows(columns, motion)):
+            found[said] = float(np.nanmin(moving)), float(np.nanmax(moving))
     return found
 
 
-def may_move(name: str, width: int) -> bool:
+def _is_series(name: str, moving: np.ndarray, others: Arrays) -> bool:
+    """Whether an array that is not as long as the motion was recorded at a rate of its own.
+
+    It has times of its own, or is long and changes as what moves does; matrices and tables do not.
+    """
+    for other, values in others.items():
+        if other != name and values.shape == moving.shape[:1] and tells_time(other, values):
+            return True
+    through = np.abs(np.diff(moving, axis=0)).sum(axis=0) <= _BENDS * np.ptp(moving, axis=0)
+    return len(moving) >= _FEWEST and bool(np.all(through))
+
+
+def _of_another(name: str, called: Sequence[str]) -> bool:
+    """Whether an array is by its name of another arm than the motion: the right one's."""
+    own, of_motion = sides(name), {side for one in called for side in sides(one)}
+    return bool(own - of_motion) and bool(of_motion or own & {"left", "right"})
+
+
+def sides(name: str) -> set[str]:
+    """Return which of several arms a name says that it is of: `left`, `r`, `robot1`."""
+    spaced = re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower()
+    return {match.group().replace("_", "") for match in _SIDE.finditer(spaced)}
+
+
+def may_move(name: str, width: int = 1) -> bool:
     """Whether an array of so many numbers a frame could be a part of the motion, by its name."""
     own = name.rpartition("/")[2]
     no_motion = says_no_position(own) or says_time(own) or _MASK.fullmatch(own)
@@ -297,7 +402,7 @@ def _moves(values: Times) -> bool:
 
 
 def _follows(values: np.ndarray, motion: Positions) -> bool:
-    """Whether columns are another reading of the motion's: in another unit, from another zero."""
+    """Whether columns are another reading of the motion's: in another unit, or a command."""
     width, most = values.shape[1], motion.shape[1]
     if width > most and width % most == 0:  # several vectors under one name
         return all(_follows(values[:, k :: width // most], motion) for k in range(width // most))
@@ -311,10 +416,11 @@ def _follows(values: np.ndarray, motion: Positions) -> bool:
         for delay in sorted(delays.tolist(), key=abs):
             one = values[max(0, delay) : len(values) + min(0, delay)]
             two = own[max(0, -delay) : len(own) - max(0, delay)]
-            one, two = one - one.mean(axis=0), two - two.mean(axis=0)
             spread = np.std(two, axis=0)
             spread = np.maximum(spread, np.median(spread))
             for scale in _SCALES:
-                if np.all(np.std(one - scale * two, axis=0) <= _SAME * scale * spread):
+                apart = one - scale * two
+                near = np.abs(apart.mean(axis=0)) <= _OTHER_ZERO * scale * spread
+                if np.all(near & (np.std(apart, axis=0) <= _SAME * scale * spread)):
                     return True
     return False

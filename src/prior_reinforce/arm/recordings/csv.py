@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import columns_beside, is_clock, names_said, words
+from prior_reinforce.arm.recordings.beside import columns_beside, headed, is_clock, names_said
 from prior_reinforce.arm.recordings.clock import (
     FRAME,
     NO_COLUMN,
@@ -30,7 +30,7 @@ from prior_reinforce.arm.recordings.clock import (
     skips_frames,
     tells_time,
 )
-from prior_reinforce.arm.recordings.naming import find_channels, numbered_like, vectors
+from prior_reinforce.arm.recordings.naming import find_channels, numbered_like, vectors, words
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     EPISODE_COLUMNS,
@@ -101,7 +101,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         if len(paths) > 1 and path.stem in (options.leave_out or ()):
             yield path.stem, unread
             continue
-        table = read_table(path, options.delimiter, options.decimal)
+        table = headed(read_table(path, options.delimiter, options.decimal), options.joints)
         said = _said_above(path)
         if not table.names or len(table) < 2:
             raise FileFormatError(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import re
 from functools import partial
 from pathlib import Path
@@ -16,9 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import may_move, recorded_among, words
+from prior_reinforce.arm.recordings.beside import may_move, recorded_among
 from prior_reinforce.arm.recordings.bounds import MOST_COLUMNS, check_numbers
 from prior_reinforce.arm.recordings.clock import Stamps
+from prior_reinforce.arm.recordings.naming import said_in
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     Episodes,
@@ -34,6 +36,8 @@ _KEYS = ("obs/robot0_joint_pos", "obs/agent/qpos", "observations/qpos")
 """Measured positions of the first arm; `actions` are mostly pose increments or targets."""
 _MOST_BESIDE, _MOST_BYTES_OF_NAMES = 64, 100_000
 """Members of a group that is looked through for names, and bytes of these."""
+_MOST_AT_OWN_RATE = 1_000_000
+"""Numbers of what moves at another rate than the motion. Ours: sound has more."""
 _EPISODE = re.compile(r"(demo|traj|episode)_?\d+")
 
 
@@ -64,11 +68,12 @@ def _demo(
         key = keys[0]
         arrays = {name: _motion(path, group, name) for name in keys}
         count = len(arrays[key])
-        # Whatever has as many frames, and may move, tell the time, or mark what is padding.
+        # Whatever may move, at any rate, or tells the time of the frames, or marks what is padding.
         there = {
             name: _numbers(path, name, _own(path, group, name))
             for name, own in _shapes(group).items()
-            if own[0] == count and (len(own) == 1 or (len(own) == 2 and may_move(name, own[1])))
+            if len(own) <= 2 and (own[0] == count or math.prod(own) <= _MOST_AT_OWN_RATE)
+            if (own[0] == count and len(own) == 1) or may_move(name, math.prod(own[1:]))
         } | arrays
         texts, stated = _said(path, top, group, key)
         stated |= {n: np.asarray(v) for n, v in made_by.items() if isinstance(v, (int, float))}
@@ -103,8 +108,13 @@ def _said(
                 value = np.asarray(within[name])
                 if value.dtype.kind in "biuf":
                     stated.setdefault(name, value)
-                elif len(text := words(value)) > 1 or node == own:
-                    texts.setdefault(name, text)
+                    continue
+                of_text, numbers = said_in({name: value})
+                for place, text in of_text.items():
+                    if len(text) > 1 or node == own:
+                        texts.setdefault(place, text)
+                for place, number in numbers.items():
+                    stated.setdefault(place, np.asarray(number))
     return texts, stated
 
 

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
 
 from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, say_names, split_unit
 from prior_reinforce.arm.robots.limits import is_joint, says_no_position
@@ -15,6 +20,10 @@ _OF_POSITIONS = re.compile(
     r"(?<=.)([./\[]+(positions?|angle|value|q)\]?|_pos(ition)?)$", re.IGNORECASE
 )
 """What follows a joint's name where tools write the messages' fields: `/elbow/position`."""
+Texts = Mapping[str, tuple[str, ...]]
+"""Texts of a file, by what it calls them."""
+_DEEPEST = 12
+"""Levels of dicts that are searched for names."""
 _NUMBERED = re.compile(r"(?P<stem>.*?)[_.\[ ]*(?P<number>\d+)\]?")
 
 
@@ -69,6 +78,65 @@ def numbered_like(joints: Sequence[str], there: Sequence[str]) -> tuple[str, ...
     called = [stem for stem in fitting if _POSITIONS.search(stem) is not None]
     clear = list(fitting) if len(fitting) == 1 else called
     return tuple(there[i] for i in fitting[clear[0]]) if len(clear) == 1 else None
+
+
+def words(said: Any) -> tuple[str, ...]:
+    """Return the texts of an array, or of one text that lists several; none if they are none."""
+    listed = said.ravel().tolist() if isinstance(said, np.ndarray) else said
+    found = list(listed) if isinstance(listed, (list, tuple)) else [listed]
+    found = [t.decode(errors="replace") if isinstance(t, bytes) else t for t in found]
+    if not all(isinstance(text, str) for text in found):
+        return ()
+    if len(found) == 1:
+        text = found[0].strip().strip("[]()")
+        found = text.split(",") if "," in text else text.split()
+    return tuple(str(text).strip().strip("'\"") for text in found)
+
+
+def said_in(named: Mapping[str, Any]) -> tuple[dict[str, tuple[str, ...]], dict[str, float]]:
+    """Return the texts and the numbers in what a file says of itself, by their place in it.
+
+    JSON and dicts are searched, however deep: `meta.robot.joint_names`, `meta.fps`.
+    """
+    texts: dict[str, tuple[str, ...]] = {}
+    numbers: dict[str, float] = {}
+    for name, said in named.items():
+        for place, value in _search(name, said):
+            if isinstance(value, (int, float)):
+                numbers.setdefault(place, value)
+            elif own := words(value):
+                texts.setdefault(place, own)
+    return texts, numbers
+
+
+def _search(place: str, said: Any, depth: int = _DEEPEST) -> Iterator[tuple[str, Any]]:
+    """Every number, text and list of texts in what is said, with its place."""
+    said = said.tolist() if isinstance(said, np.ndarray) else said
+    said = said[0] if isinstance(said, list) and len(said) == 1 else said
+    said = said.decode(errors="replace") if isinstance(said, bytes) else said
+    if isinstance(said, str) and said.lstrip("\ufeff \r\n\t")[:1] in ("{", "["):
+        with contextlib.suppress(ValueError, RecursionError):
+            said = json.loads(said.lstrip("\ufeff"))
+    if isinstance(said, list) and said and all(isinstance(one, Mapping) for one in said):
+        keys = [key for key in said[0] if all(key in one for one in said)]
+        said = {key: [one[key] for one in said] for key in keys}  # [{"name": "elbow"}, ...]
+    if isinstance(said, Mapping):
+        if len(said) > 1 and _numbers_its_names(said):  # {"elbow": 0, "pan": 1}
+            yield place, sorted(map(str, said), key=lambda name: said[name])
+        for key, one in said.items() if depth else ():
+            yield from _search(f"{place}.{key}" if place else str(key), one, depth - 1)
+    elif isinstance(said, str) and said.lstrip()[:1] == "{":
+        return
+    elif isinstance(said, (int, float, str)) and not isinstance(said, bool):
+        yield place, said
+    elif isinstance(said, (list, tuple)):
+        yield place, list(said)
+
+
+def _numbers_its_names(said: Mapping[Any, Any]) -> bool:
+    """Whether every key has its own number from 0, as the place of a column."""
+    numbers = [n for n in said.values() if isinstance(n, int) and not isinstance(n, bool)]
+    return len(numbers) == len(said) and sorted(numbers) == list(range(len(said)))
 
 
 def _find(name: str, there: Sequence[str]) -> int | None:

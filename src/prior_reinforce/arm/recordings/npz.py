@@ -7,15 +7,17 @@ units, `lengths`, and `outcome`, `outcomes` or `outcomes_seen`.
 
 from __future__ import annotations
 
+import contextlib
 import json
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import Arrays, recorded_among, words
+from prior_reinforce.arm.recordings.beside import Arrays, recorded_among
 from prior_reinforce.arm.recordings.bounds import MOST_BYTES, check_bytes
-from prior_reinforce.arm.recordings.naming import find_channels
+from prior_reinforce.arm.recordings.naming import find_channels, said_in
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     EPISODE_COLUMNS,
@@ -88,7 +90,7 @@ def _episodes(path: Path, arrays: Arrays, name: str, options: ReadOptions) -> Ep
             f"{path}: outcomes have shape {outcomes.shape}, expected numbers of shape "
             f"({len(motions)}, k)"
         )
-    texts = {name: words(array) for name, array in arrays.items() if array.dtype.kind in "SU"}
+    texts, numbers = said_in({n: array for n, array in arrays.items() if array.dtype.kind in "SU"})
     names = next((texts[name] for name in ("joint_names", "names") if name in texts), ())
     wrong = len(keys) == 1 and len(set(names)) != motions.shape[2]
 
@@ -107,7 +109,7 @@ def _episodes(path: Path, arrays: Arrays, name: str, options: ReadOptions) -> Ep
             there,
             options,
             texts=texts,
-            stated=own,
+            stated={**numbers, **own},
             names=names if wrong else (),
             outcome=outcome,
         )
@@ -125,9 +127,13 @@ def _arrays(path: Path) -> Arrays:
     remedy = "it must be an NPZ with plain number arrays; copy it again, or say its format"
     with open_npz(path, remedy, MOST_BYTES) as archive:
         content = {name: np.asarray(archive[name]) for name in archive.files}
-        if "metadata" in content:
-            metadata = json.loads(str(content.pop("metadata")))
-            form = metadata.get("format", metadata)
+        said: Any = {}
+        with contextlib.suppress(ValueError, KeyError):
+            said = json.loads(str(content["metadata"]))
+        ours = isinstance(said, dict) and str(said.get("file_format")).startswith("prior-reinforce")
+        if ours:  # else another program's, which is searched as any text is
+            form = said.get("format", said)
             content.setdefault("dt", np.array(float(form["dt"])))
             content.setdefault("names", np.array(form.get("names") or form.get("joint_names")))
+            del content["metadata"]
         return content

@@ -7,8 +7,9 @@ a message. Joints are matched by name in every message, because nothing fixes th
 from __future__ import annotations
 
 import re
+import struct
 from collections import Counter
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -17,10 +18,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import moves_beside
+from prior_reinforce.arm.recordings.beside import may_move, moves_beside
 from prior_reinforce.arm.recordings.bounds import check_names, check_numbers
 from prior_reinforce.arm.recordings.clock import Times
-from prior_reinforce.arm.recordings.naming import find_channels
+from prior_reinforce.arm.recordings.naming import find_channels, vectors
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     Episodes,
@@ -33,6 +34,7 @@ from prior_reinforce.arm.recordings.recording import (
     unread,
 )
 from prior_reinforce.arm.recordings.units import say_names
+from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.files import require_inside
 
@@ -46,9 +48,17 @@ _MOVES, _LEAP, _OFTEN = 0.02, 0.5, 0.05
 """Range in [rad] or [m] that is a motion; part of it that is a leap; share of frames in which no
 joint leaps, but two publishers do in turn. Ours."""
 _STATE, _TRAJECTORY = "sensor_msgs/msg/JointState", "trajectory_msgs/msg/JointTrajectory"
-
-_NUMBERS = re.compile(r"std_msgs/msg/(Bool|U?Int\d+|Float\d+)(MultiArray)?")
-"""Types of messages of numbers alone, as drivers of grippers send them."""
+_OF_NO_JOINT = re.compile(
+    r"(rcl_interfaces|rosgraph_msgs|diagnostic_msgs|tf2?_msgs|\w*geometry_msgs|nav_msgs|shape_msgs"
+    r"|lifecycle_msgs|rosbag_msgs)/|/(Image|CompressedImage|CameraInfo|LaserScan|PointCloud2?|Imu"
+    r"|MagneticField|NavSatFix|Joy|BatteryState|Temperature)$"
+)
+"""Types of messages that no lift or gripper sends: of ROS itself, places, cameras and the like."""
+_FOOTER, _MOST_SUMMARY = struct.Struct("<BQQQI8s"), 10_000_000
+"""The end of an MCAP, and bytes of the list of what is in it."""
+_TIME = re.compile(r"builtin_interfaces/msg/(Time|Duration)|std_msgs/msg/Header")
+_MOST_BYTES = 2_000
+"""Bytes of a message of a lift's or gripper's position at most. Ours: others are pictures."""
 
 
 class Message(NamedTuple):
@@ -98,6 +108,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
                 f"{bag} holds {len(files)} files of a bag and no metadata.yaml, as a recorder that "
                 f"was killed leaves it; write it anew: ros2 bag reindex {bag}"
             )
+        _refuse_other_messages(files[0])
         with named_damage(bag, _BAG):
             # Bags from before ROS 2 Iron carry no definitions; these two messages never changed.
             definitions = get_typestore(Stores.LATEST)
@@ -109,18 +120,32 @@ def read(source: Path, options: ReadOptions) -> Episodes:
                 (connections, kind), *_ = topics
                 taken = {own[0].topic for own, _ in topics}
                 rest = {c.topic: c for c in reader.connections if c.topic not in taken}
-                unread_topics = sorted(n for n, c in rest.items() if c.msgtype == _STATE)
+                joint_topics = sorted(n for n, c in rest.items() if c.msgtype == _STATE)
                 moving: dict[str, tuple[float, float]] = {}
+                unknown = []
                 for c in rest.values():
-                    if _NUMBERS.fullmatch(c.msgtype):
+                    if c.msgtype not in reader.typestore.fielddefs:
+                        unknown.append(f"{c.topic} ({c.msgtype})")
+                    elif c.msgtype not in (_STATE, _TRAJECTORY):
                         moving |= _moving(c.topic, _messages(reader, [c]))
+        notes = [f"not read: topics {', '.join(joint_topics)} (--key given again takes one)"]
+        notes = notes * bool(joint_topics)
+        if unknown:
+            what = f"not read: topics {', '.join(sorted(unknown))}, whose messages the bag does not"
+            notes.append(f"{what} describe; if one is a lift's or a gripper's, write it as CSV")
+        for (own, _), said in zip(topics[1:], beside, strict=True):
+            if not any(m.content.name for m in said):
+                raise FileFormatError(
+                    f"{bag}: topic {own[0].topic} ({own[0].msgtype}) has no numbers that could be "
+                    "positions; drop that --key, or write them as CSV"
+                )
         if not messages:
             raise FileFormatError(
                 f"{bag}: topic {connections[0].topic} has no messages; drop that bag, or leave it "
                 "out with --leave-out"
             )
         if kind == _STATE:
-            there = (beside, unread_topics, moving)
+            there = (beside, notes, moving)
             yield name, partial(_states, bag, name, messages, options, *there)
             continue
         for index, message in enumerate(messages):
@@ -143,29 +168,100 @@ def _files_of(bag: Path) -> list[Path]:
     return [path for path in within if path.is_file() and has_suffix(path, _SUFFIXES)]
 
 
+def _refuse_other_messages(path: Path) -> None:
+    """Refuse an MCAP whose messages are not of ROS: JSON, for instance.
+
+    Its last part says so (mcap.dev/spec): a footer tells where the channels are listed.
+    """
+    found = set()
+    if has_suffix(path, (".mcap",)) and path.is_file():
+        with path.open("rb") as file:
+            file.seek(max(0, path.stat().st_size - _FOOTER.size))
+            end = file.read()
+            opcode, _, start, *_ = _FOOTER.unpack(end) if len(end) == _FOOTER.size else (0, 0, 0)
+            size = path.stat().st_size - start - _FOOTER.size
+            if opcode == 2 and start > 0 and 0 < size < _MOST_SUMMARY:
+                file.seek(start)
+                summary = file.read(size)
+                found = {*_encodings(summary)}
+    if found and not found & {"cdr", "ros1"}:
+        kinds = " and ".join(sorted(one.upper() for one in found))
+        raise FileFormatError(
+            f"{path}: its messages are {kinds}, and those of ROS alone are read; save their times, "
+            "joint names and positions as NPZ or CSV"
+        )
+
+
+def _encodings(summary: bytes) -> Iterator[str]:
+    """How the messages of each channel are written, from the records at the end of an MCAP."""
+    at = 0
+    while at + 9 <= len(summary):
+        opcode, length = struct.unpack_from("<BQ", summary, at)
+        record, at = summary[at + 9 : at + 9 + length], at + 9 + length
+        if opcode == 4 and len(record) >= 8:  # a channel: numbers of itself and its schema, topic
+            first = 8 + int.from_bytes(record[4:8], "little")
+            size = int.from_bytes(record[first : first + 4], "little")
+            yield record[first + 4 : first + 4 + size].decode(errors="replace")
+
+
 def _numbers(topic: str, message: Any) -> Any:
-    """A message of numbers as one of joints that are called by its topic; others as they are."""
-    if not hasattr(message, "data"):
+    """A message as one of joints that are called by its topic; those of joints as they are."""
+    if message.__msgtype__ in (_STATE, _TRAJECTORY):
         return message
-    values = np.ravel(np.asarray(message.data, dtype=float))
-    names = [topic] if len(values) == 1 else [f"{topic}_{i}" for i in range(len(values))]
-    return SimpleNamespace(name=names, position=values)
+    fields = {
+        f"{topic}{'' if path == '/data' else path}": np.ravel(np.asarray(values, dtype=float))
+        for path, values in _fields(message)
+    }
+    other = says_no_position(topic.rpartition("/")[2])
+    fields = {n: own for n, own in fields.items() if may_move(n, len(own)) and not other}
+    names = [
+        name if len(own) == 1 else f"{name}_{i}"
+        for name, own in fields.items()
+        for i in range(len(own))
+    ]
+    return SimpleNamespace(name=names, position=np.concatenate([*fields.values(), []]))
+
+
+def _fields(message: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Every number or array of numbers in a message, by its path; none of times and headers."""
+    for name, value in vars(message).items():
+        kind = getattr(value, "__msgtype__", None)
+        if isinstance(value, (bool, int, float)) or (
+            isinstance(value, np.ndarray) and value.dtype.kind in "biuf"
+        ):
+            yield f"{path}/{name}", value
+        elif kind is not None and not _TIME.fullmatch(kind):
+            yield from _fields(value, f"{path}/{name}")
 
 
 def _moving(topic: str, messages: Sequence[Message]) -> dict[str, tuple[float, float]]:
-    """The range of a topic of numbers that is not read, if it moves."""
+    """The range of the only number, or list of numbers, of a topic that moves; none of several.
+
+    Several in one message are mostly a pose, or what a driver says of itself.
+    """
+    names = messages[0].content.name if messages else []
     rows = [m.content.position for m in messages]
-    if len(rows) < 2 or len({len(row) for row in rows}) > 1:
+    if len(rows) < 2 or not names or len({len(row) for row in rows}) > 1:
         return {}
     times = np.array([m.stamp - messages[0].stamp for m in messages]) * 1e-9
-    return moves_beside(np.zeros((len(rows), 1)), {topic: np.array(rows)}, times)
+    groups = vectors(names) if len(names) > 1 else {}
+    grouped = {i for group in groups.values() for i in group}
+    groups |= {name: [i] for i, name in enumerate(names) if i not in grouped}
+    fields = {name: np.array(rows)[:, group] for name, group in groups.items()}
+    found = moves_beside(np.zeros((len(rows), 1)), fields, times)
+    return found if len(found) == 1 else {}
 
 
 def _messages(reader: Any, connections: Sequence[Any]) -> list[Message]:
-    return [
-        Message(stamp, c.id, _numbers(c.topic, reader.deserialize(raw, c.msgtype)))
-        for c, stamp, raw in reader.messages(connections=connections)
-    ]
+    """The messages of a topic; of one that no joint, lift or gripper sends, none."""
+    found = []
+    for c, stamp, raw in reader.messages(connections=connections):
+        joints = c.msgtype in (_STATE, _TRAJECTORY)
+        if not joints and (len(raw) > _MOST_BYTES or _OF_NO_JOINT.search(c.msgtype)):
+            return []
+        content = _numbers(c.topic, reader.deserialize(raw, c.msgtype))
+        found.append(Message(stamp, c.id, content))
+    return found
 
 
 def _topic(bag: Path, reader: Any, key: str | None, *, beside: bool) -> tuple[list[Any], str]:
@@ -174,7 +270,7 @@ def _topic(bag: Path, reader: Any, key: str | None, *, beside: bool) -> tuple[li
     usable = {topic: kind for topic, kind in kinds.items() if kind in (_STATE, _TRAJECTORY)}
     if key is None and len(usable) == 1:
         key = next(iter(usable))
-    number = beside and _NUMBERS.fullmatch(kinds.get(str(key), "")) is not None
+    number = beside and key in kinds and not _OF_NO_JOINT.search(kinds[str(key)])
     if key is None or not (key in usable or number):
         listed = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(usable.items()))
         raise FileFormatError(
@@ -190,7 +286,7 @@ def _states(
     messages: list[Message],
     options: ReadOptions,
     beside: Sequence[list[Message]],
-    unread_topics: Sequence[str],
+    notes: Sequence[str],
     moving: Mapping[str, tuple[float, float]],
 ) -> Recording:
     """One episode of JointStates of one publisher.
@@ -218,8 +314,7 @@ def _states(
     kept, remarks = _of_one_publisher(bag, [m for m in kept if len(m.content.position)], wanted)
     if len(kept) < len(messages):
         remarks.append(f"{len(messages) - len(kept)} messages without all joints skipped")
-    if unread_topics:
-        remarks.append(f"not read: topics {', '.join(unread_topics)} (--key given again takes one)")
+    remarks += notes
     # Other channels of these messages, such as fingers, stay available by name.
     names = tuple(n for n in kept[0].content.name if all(n in m.content.name for m in kept))
     with named_damage(bag, _BAG):

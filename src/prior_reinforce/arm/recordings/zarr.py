@@ -8,6 +8,7 @@ writer adds `data/timestamp`, as UMI's does.
 from __future__ import annotations
 
 import json
+import math
 import re
 import zipfile
 from collections.abc import Iterator, Mapping
@@ -17,9 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import may_move, recorded_among, words
+from prior_reinforce.arm.recordings.beside import may_move, recorded_among
 from prior_reinforce.arm.recordings.bounds import check_bytes, check_chunks, check_numbers
 from prior_reinforce.arm.recordings.clock import Stamps
+from prior_reinforce.arm.recordings.naming import said_in
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import Episodes, Recording, named_damage
 from prior_reinforce.errors import FileFormatError
@@ -28,6 +30,8 @@ from prior_reinforce.files import require_inside
 Arrays = Mapping[str, tuple[tuple[int, ...], tuple[int, ...]]]
 """Shape and chunks of each array of numbers, by its name in the store."""
 _ENDS = "meta/episode_ends"
+_MOST_FASTER = 20
+"""Times as many numbers as the motion has, of what moves at a rate of its own. Ours."""
 _NUMBERS = re.compile(r"([<>|][biuf]\d+)|(bool|u?int\d+|float\d+)")
 _CODECS = frozenset(
     {"blosc", "bytes", "bz2", "crc32c", "delta", "gzip", "lz4", "lzma"}
@@ -71,14 +75,17 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         ends = np.asarray(_numbers(source, group, arrays, _ENDS), dtype=np.int64).ravel()
         shapes = {name: arrays[f"data/{name}"][0] for name in there}
         count = shapes[keys[0]][0]
+        most = _MOST_FASTER * math.prod(shapes[keys[0]])  # sound has more
         numbers = {
             name: _numbers(source, group, arrays, f"data/{name}")
             for name, (frames, *width) in shapes.items()
             if name in keys
-            or (frames == count and (not width or (len(width) == 1 and may_move(name, width[0]))))
+            or (frames == count and not width)
+            or (len(width) < 2 and frames * math.prod(width) <= most and may_move(name, *width))
         }
         nodes = (group[f"data/{keys[0]}"], group["data"], group)
-        texts = {name: words(said) for node in nodes[::-1] for name, said in node.attrs.items()}
+        texts, stated = said_in({n: said for node in nodes[::-1] for n, said in node.attrs.items()})
+        stated = {f".{name}": number for name, number in stated.items()}  # of all episodes: a rate
     if ends.size == 0:
         raise FileFormatError(f"{source} holds no episode; copy the store again")
     starts = np.concatenate([[0], ends[:-1]])
@@ -90,8 +97,11 @@ def read(source: Path, options: ReadOptions) -> Episodes:
     for number, (start, end) in enumerate(zip(starts.tolist(), ends.tolist(), strict=True)):
 
         def one(episode: str = str(number), start: int = start, end: int = end) -> Recording:
-            own = {name: array[start:end] for name, array in numbers.items()}
-            return recorded_among(source, episode, keys, own, options, texts=texts)
+            own = {
+                name: array[start * len(array) // count : end * len(array) // count]
+                for name, array in numbers.items()
+            }
+            return recorded_among(source, episode, keys, own, options, texts=texts, stated=stated)
 
         yield str(number), one
 
