@@ -358,7 +358,8 @@ class Workspace:
             source = f"{source}, without what moves as well: {left_out}"
         if append:
             before = self.demonstrations
-            demonstrations, n_before = appended(before, demonstrations), before.n
+            limits = result.preview.inspection.limits
+            demonstrations, n_before = appended(before, demonstrations, limits), before.n
             source = f"{source}, appended to {n_before}"
         self.import_demonstrations(demonstrations, source)
         return n_before
