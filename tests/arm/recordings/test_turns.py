@@ -81,3 +81,44 @@ def test_an_attitude_that_keeps_its_form_stays(names):
     read, said = brought_together(names, "deg", true)
     np.testing.assert_allclose(read, true, atol=1e-9)
     assert said == ""
+
+
+def radians(course):
+    """Two joints of throws whose third channel is that course."""
+    return [
+        np.column_stack([0.1 + 0.5 * S * (1 + 0.1 * i), 0.2 - 0.8 * S, course(i)]) for i in range(N)
+    ]
+
+
+@pytest.mark.parametrize("name", ["gripper_yaw", "Gripper Roll", "hand/gripper_rotation"])
+def test_how_a_gripper_is_turned_is_an_angle(name):
+    true = radians(lambda i: 3.1 + 0.3 * S)
+    read = [np.where([0, 0, 1], np.mod(q + np.pi, 2 * np.pi) - np.pi, q) for q in true]
+    read[1][:, 2] = true[1][:, 2] - 2 * np.pi
+    positions, said = brought_together(("j1", "j2", name), None, read)
+    np.testing.assert_allclose(positions, true, atol=1e-9)
+    assert f"{name} passes the end" in said
+
+
+@pytest.mark.parametrize("name", ["magnet", "spring", "preload"])
+@pytest.mark.parametrize(
+    "course",
+    [
+        lambda i: np.where(T < 0.8, 6.2, 0.0),
+        lambda i: np.where(T < 0.8, 6.2 * (i % 2), 6.2 * (1 - i % 2)),
+        lambda i: np.full(len(T), (0.2, 2.6, 3.9, 6.3)[i]),
+    ],
+)
+def test_a_number_without_unit_that_is_no_angle_stays(name, course):
+    true = radians(course)
+    positions, said = brought_together(("j1", "j2", name), None, true)
+    np.testing.assert_array_equal(positions, true)
+    assert said == ""
+
+
+@pytest.mark.parametrize("name", ["j3", "wrist", "q[2]", "c2", "crank"])
+def test_an_angle_without_unit_is_continued(name):
+    true = radians(lambda i: 2.9 + 0.6 * S)
+    read = [np.where([0, 0, 1], np.mod(q + np.pi, 2 * np.pi) - np.pi, q) for q in true]
+    positions, _ = brought_together(("j1", "j2", name), None, read)
+    np.testing.assert_allclose(positions, true, atol=1e-9)

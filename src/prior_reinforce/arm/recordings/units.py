@@ -38,6 +38,8 @@ _NO_ANGLE = re.compile(
     r"|pressure|force|torque|voltage|temperature",
     re.I,
 )
+_ATTITUDE = re.compile(r"(.*[^a-z])?(roll|pitch|yaw|rotation)[^a-z]*", re.I)
+"""And of what stands there all the same: `gripper_yaw`."""
 _PLACE = re.compile(r"(?P<stem>|.*[^a-z0-9])(?P<axis>[xyz])", re.IGNORECASE)
 _OF_PLACE = re.compile(
     r"(.*[^a-z])?(p|pos|positions?|place|trans(lation)?|cart(esian)?|tcp|tool|tip|ee|eef|pose|xyz"
@@ -83,7 +85,7 @@ def known_unit(text: str) -> str | None:
 
 def is_no_angle(name: str) -> bool:
     """Whether a channel's name says that it is no angle unless its unit is said: a gripper's."""
-    return _NO_ANGLE.search(name) is not None
+    return _NO_ANGLE.search(name) is not None and _ATTITUDE.fullmatch(name.strip()) is None
 
 
 def place_names(names: Sequence[str]) -> set[str]:
