@@ -16,8 +16,6 @@ TESTED_ELSEWHERE = {
     "adapters/moved_prior": "the prior of the model in adapters/test_moved",
     "adapters/moved_trials": "the trials of the model in adapters/test_moved",
     "arm/executing/base": "an interface, held to in arm/executing/test_drive",
-    "arm/recordings/appending": "more of them is in arm/recordings/test_importer",
-    "arm/recordings/turns": "turns and signs between throws are in arm/recordings/test_real_forms",
     "arm/workspace/events": "what they add up to is in arm/workspace/test_state",
     "arm/workspace/folder": "what is one and what is not is in arm/workspace/test_workspace",
     "arm/workspace/reaching": "goals out of reach are in arm/workspace/test_declared",

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -27,7 +27,7 @@ _VECTOR = re.compile(r"(?P<stem>.*?)(?P<part>(?<![a-z])r[._]?[xyz]|[._ /]?[xyz])
 _OF_VECTOR = re.compile(r"rot_?vec|axis_?angle", re.IGNORECASE)
 _PATTERNS = ((_QUATERNION, _OF_ATTITUDE, "wxyz"), (_VECTOR, _OF_VECTOR, "xyz"))
 
-_LAST_WORD = re.compile(r"(?P<stem>|.*[^a-z])(?P<word>[a-z]+)")
+_LAST_WORD = re.compile(r"(?P<stem>|.*?[^a-z])(?P<word>r[._]?[xyz]|[a-z]+)")
 """`tool_yaw`: what it is of, and which angle."""
 
 Frames = TypeVar("Frames", bound=np.ndarray)
@@ -74,12 +74,12 @@ def euler_angles(names: Sequence[str], units: Sequence[str]) -> tuple[tuple[str,
     The second of each is the middle turn, whatever the order in which they are recorded.
     """
     found = []
-    for letters in (("roll", "pitch", "yaw"), ("a", "b", "c")):
+    for letters in _EULER:
         groups: dict[str, dict[str, str]] = {}
         for name, unit in zip(names, units, strict=True):
-            match = _LAST_WORD.fullmatch(name.strip().lower())
-            if unit in TURN and match is not None and match["word"] in letters:
-                groups.setdefault(match["stem"], {})[match["word"]] = name
+            word = _last_word(name)
+            if unit in TURN and word is not None and word[1] in letters:
+                groups.setdefault(word[0], {})[word[1]] = name
         for group in groups.values():
             if len(group) == 3:
                 first, middle, last = (group[letter] for letter in letters)
@@ -87,7 +87,44 @@ def euler_angles(names: Sequence[str], units: Sequence[str]) -> tuple[tuple[str,
     return tuple(found)
 
 
-def other_euler_angles(angles: np.ndarray, turn: float) -> np.ndarray:
-    """Return the other Euler angles (..., 3) of the same attitudes, the middle turn second."""
+def other_euler_forms(group: Sequence[str]) -> tuple[EulerForm, ...]:
+    """Return how the other angles of the same attitude may be computed, by the angles' names.
+
+    Two ways where the names do not say whether the first and the last turn are about one axis.
+    """
+    words = tuple(word[1] for word in map(_last_word, group) if word is not None)
+    return _EULER.get(words, _EITHER)
+
+
+def _last_word(name: str) -> tuple[str, str] | None:
+    """What an angle is of, and which angle it is: `tool_yaw`, `r.x`."""
+    match = _LAST_WORD.fullmatch(name.strip().lower())
+    return match and (match["stem"], re.sub("[._]", "", match["word"]))
+
+
+def other_euler_angles(turn: float, angles: np.ndarray) -> np.ndarray:
+    """Return the other angles (..., 3) of the same attitudes, about three axes: XYZ, ZYX, ..."""
     half = turn / 2
     return np.stack([angles[..., 0] + half, half - angles[..., 1], angles[..., 2] + half], axis=-1)
+
+
+def other_proper_euler_angles(turn: float, angles: np.ndarray) -> np.ndarray:
+    """Return the other angles (..., 3) of the same attitudes, about two axes: ZYZ, ZXZ, ..."""
+    half = turn / 2
+    return np.stack([angles[..., 0] + half, -angles[..., 1], angles[..., 2] + half], axis=-1)
+
+
+EulerForm = Callable[[float, np.ndarray], np.ndarray]
+"""From a whole turn and angles (..., 3), the middle turn second, to the other angles."""
+_EITHER = (other_euler_angles, other_proper_euler_angles)
+_EULER: Mapping[tuple[str, ...], tuple[EulerForm, ...]] = {
+    ("roll", "pitch", "yaw"): (other_euler_angles,),
+    ("w", "p", "r"): (other_euler_angles,),
+    ("o", "a", "t"): (other_proper_euler_angles,),
+    ("a", "b", "c"): _EITHER,
+    ("rx", "ry", "rz"): _EITHER,
+    ("alpha", "beta", "gamma"): _EITHER,
+    ("psi", "theta", "phi"): _EITHER,
+}
+"""Names of Euler angles, the middle turn second, and the other angles of the same attitude: of
+Fanuc's W, P, R; Kawasaki's O, A, T; KUKA's A, B, C about three axes, and Doosan's about two."""

@@ -128,6 +128,7 @@ def test_places_and_joints_are_told_apart_by_what_x_and_y_are_of():
 
 
 def test_a_joint_is_an_angle_whatever_stands_before_its_name():
+    assert not is_no_angle("gripper_yaw")
     assert not is_no_angle("current_elbow")
     assert is_no_angle("pressure")
     assert split_unit("base_turn", CHANNEL_UNITS) == ("base_turn", None)

@@ -14,6 +14,7 @@ from jaxtyping import Float
 from msgspec import Meta
 
 from prior_reinforce.arm.recordings.clock import LONGEST
+from prior_reinforce.arm.recordings.leaps import refuse_leaps
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.arrays import Frames, Plans, Point
@@ -102,8 +103,10 @@ def preprocess(
         settings: How to trim, resample and smooth them.
 
     Raises:
-        InvalidDemonstrationsError: An episode that never moves, or is longer than the horizon.
+        InvalidDemonstrationsError: An episode that never moves, is longer than the horizon, or
+            leaps in mid-motion.
     """
+    refuse_leaps(recordings, units)
     dt = settings.dt or _common_dt(recordings)
     recordings = [_held_while_unchanged(recording) for recording in recordings]
     every, units = [r.positions for r in recordings], tuple(units)

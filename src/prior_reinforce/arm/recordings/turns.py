@@ -7,8 +7,10 @@ What cannot be decided is refused.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+import re
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -21,9 +23,8 @@ from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.whole_turns import (
     TURN,
     euler_angles,
-    other_euler_angles,
+    other_euler_forms,
     other_form,
-    whole_circles,
 )
 
 Channel = Float[np.ndarray, " T"]
@@ -37,6 +38,19 @@ _NORM = 0.05
 """By which the four numbers of a quaternion may miss length 1."""
 _SAME = 1e-3
 """The same where only that tells that they are one. Ours: recorders write four digits or more."""
+_NOISE = 0.02
+"""The same of a channel that may be no angle: a magnet's current that is switched off steps by
+about a turn too. Ours: an encoder's noise."""
+_HALF = 0.01
+"""Share of a turn by which a step of half a turn may be more or less. Ours: what a wrist turns in
+one frame."""
+_ANGLE = re.compile(
+    r"joint|axis|achse|gelenk|winkel|angle|rot|turn|twist|swing|steer|roll|pitch|yaw|heading|azimut"
+    r"|bearing|theta|phi|psi|alpha|beta|gamma|base|basis|waist|torso|shoulder|schulter|elbow"
+    r"|ellbogen|arm|wrist|hand|hip|knee|ankle|neck|head|pan|tilt",
+    re.IGNORECASE,
+)
+"""Names of angles. What has no unit is in radians all the same: a magnet's current."""
 _MOST_TURNS = 3
 
 
@@ -47,26 +61,68 @@ def aligned(selection: Selection, limits: RobotLimits | None) -> tuple[Selection
     cannot be told which way round a joint went, or which of two turns an episode is in.
     """
     form = with_turns(PlanFormat(selection.names, selection.units, 1.0), limits)
+    recorded = zip(selection.names, selection.recorded_units, strict=True)
+    degrees = {name for name, unit in recorded if unit == "deg"}
+    # `rx`, `ry`, `rz` are a rotation vector where they are in radians, and else Euler angles.
+    euler = [g for g in euler_angles(form.names, form.units) if degrees.issuperset(g)]
+    form = replace(form, attitudes=tuple(g for g in form.attitudes if {*g} not in map(set, euler)))
     motions = [np.array(recording.positions) for recording in selection.recordings]
-    named = tuple(_unit_length(form, motions))
-    form = replace(form, attitudes=(*named, *_unnamed_attitudes(form, named, motions)))
-    said: list[str] = []
-    taken = {name for group in form.attitudes for name in group}
-    for group in form.attitudes:
-        said += _align_forms(selection, motions, group)
-    for angles in euler_angles(form.names, form.units):
-        if taken.isdisjoint(angles):
-            unit = form.units[form.names.index(angles[0])]
-            said += _align_forms(selection, motions, angles, TURN[unit])
-    for i, (name, unit) in enumerate(zip(form.names, form.units, strict=True)):
-        if unit in TURN and name not in taken and not is_no_angle(name):
-            said += _align_angle(selection, motions, i, limits)
+    form = replace(form, attitudes=tuple(_unit_length(form, motions)))
+    form, said = align(form, selection.episodes, motions, limits, angles=degrees)
     recordings = tuple(
         replace(recording, positions=motion)
         for recording, motion in zip(selection.recordings, motions, strict=True)
     )
     remarks = (*selection.remarks, *said)
     return replace(selection, recordings=recordings, remarks=remarks), form
+
+
+def align(
+    form: PlanFormat,
+    episodes: Sequence[str],
+    motions: Sequence[np.ndarray],
+    limits: RobotLimits | None,
+    *,
+    angles: Collection[str] = (),
+    fixed: int = 0,
+) -> tuple[PlanFormat, list[str]]:
+    """Bring motions together in place; return their format with all attitudes, and what was done.
+
+    Args:
+        form: What their channels mean, with the attitudes that are known.
+        episodes: What to call them.
+        motions: N of them.
+        limits: Of the robot whose joints they move.
+        angles: Channels that are known to be angles, whatever their names.
+        fixed: How many, the first ones, are in use, and stay as they are: 0 or more.
+
+    Raises:
+        InvalidDemonstrationsError: As in `aligned`.
+    """
+    named = form.attitudes
+    form = replace(form, attitudes=(*named, *_unnamed_attitudes(form, named, motions)))
+    said: list[str] = []
+    taken = {name for group in form.attitudes for name in group}
+    for group in form.attitudes:
+        said += _align_forms(form, episodes, motions, group)
+    euler = [g for g in euler_angles(form.names, form.units) if taken.isdisjoint(g)]
+    own = {name for group in euler for name in group}
+    for each in (*euler, *_flipping(form, motions, taken | own, limits)):
+        said += _align_forms(
+            form, episodes, motions, each, TURN[form.units[form.names.index(each[0])]]
+        )
+    for i, (name, unit) in enumerate(zip(form.names, form.units, strict=True)):
+        if unit in TURN and name not in taken and not is_no_angle(name):
+            known = name in own or name in angles or _is_angle(name, limits)
+            said += _align_angle(form, episodes, motions, i, limits, known=known, fixed=fixed)
+    return form, said
+
+
+def _is_angle(name: str, limits: RobotLimits | None) -> bool:
+    """Whether a channel in radians is an angle by its name, and not only for want of a unit."""
+    words = re.findall(r"[^\W\d_]+", name)
+    plain = len(words) > 0 and re.search(r"\d", name) is None and max(map(len, words)) > 1
+    return not plain or _ANGLE.search(name) is not None or np.isfinite(_range(name, limits)[0])
 
 
 def _unit_length(form: PlanFormat, motions: Sequence[np.ndarray]) -> Iterator[tuple[str, ...]]:
@@ -118,85 +174,162 @@ def _start_at_two_forms(motions: Sequence[np.ndarray]) -> bool:
     return bool(some and np.all(np.minimum(near, far) < 1))
 
 
+def _flipping(
+    form: PlanFormat, motions: Sequence[np.ndarray], taken: set[str], limits: RobotLimits | None
+) -> Iterator[tuple[str, ...]]:
+    """Three angles whose first and last step by half a turn in the same frame, as no joints do."""
+    for first in range(len(form.names) - 2):
+        group, columns = form.names[first : first + 3], slice(first, first + 3)
+        turn = TURN.get(form.units[first])
+        joints = any(np.isfinite(_range(name, limits)[0]) for name in group)
+        if turn is None or {*form.units[columns]} != {form.units[first]}:
+            continue
+        if joints or not taken.isdisjoint(group) or any(map(is_no_angle, group)):
+            continue
+        steps = [np.abs(np.diff(motion[:, columns], axis=0)) % turn for motion in motions]
+        half = [np.abs(s[:, [0, 2]] - turn / 2).max(axis=1) < _HALF * turn for s in steps]
+        if any(map(np.any, half)):
+            taken = taken | {*group}
+            yield group
+
+
+@dataclass(frozen=True, eq=False)
+class _InForms:
+    """Motions in those forms of an attitude that continue each other."""
+
+    frames: list[np.ndarray]
+    passed: list[int]
+    """Motions that change their form."""
+    turned: list[int]
+    """Motions that start in another form than the first."""
+    near: Channel
+    far: Channel
+    """How far each starts from the first, as it is and in the other form."""
+    leaps: float
+    """What is left of steps from frame to frame, and from start to start: their sum."""
+
+
+def _in_forms(
+    motions: Sequence[np.ndarray],
+    other: Callable[[np.ndarray], np.ndarray],
+    apart: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    margin: float,
+) -> _InForms:
+    """Take the form that is nearest to the frame, and to the motion, before."""
+    frames, passed, turned, leaps = [], list[int](), list[int](), 0.0
+    starts = []
+    for i, own in enumerate(motions):
+        forms = np.stack([own, other(own)])
+        which = np.zeros(len(own), dtype=int)
+        steps = apart(forms[:, None, 1:], forms[:, :-1])  # of each form now from each before
+        for t in np.flatnonzero(
+            steps.min(axis=(0, 1)) < np.maximum(steps[0, 0], steps[1, 1]) - margin
+        ).tolist():
+            k = which[t]
+            if steps[1 - k, k, t] < steps[k, k, t] - margin:
+                which[t + 1 :] = 1 - k
+        if np.any(which):
+            passed.append(i)
+        near, far = apart(forms[:, 0], motions[0][0])
+        if far < near - margin:
+            which = 1 - which
+            turned.append(i)
+        starts.append((near, far))
+        frames.append(forms[which, np.arange(len(own))])
+        leaps += float(apart(frames[-1][1:], frames[-1][:-1]).sum() + min(near, far))
+    near, far = np.array(starts).T
+    return _InForms(frames, passed, turned, near, far, leaps)
+
+
 def _align_forms(
-    selection: Selection, motions: Sequence[np.ndarray], group: Sequence[str], turn: float = 0.0
+    form: PlanFormat,
+    episodes: Sequence[str],
+    motions: Sequence[np.ndarray],
+    group: Sequence[str],
+    turn: float = 0.0,
 ) -> Iterator[str]:
     """Take the form of an attitude that is nearest to the frame, and to the episode, before.
 
     `turn` is a whole turn of Euler angles; 0 is of quaternions and rotation vectors.
     """
-    columns, what = [selection.names.index(name) for name in group], ", ".join(group)
-    first, passed, turned = motions[0][0, columns], list[str](), list[str]()
-    margin = _NEXT * turn / TURN["rad"]
+    columns, what = [form.names.index(name) for name in group], ", ".join(group)
+    others: Sequence[Callable[[np.ndarray], np.ndarray]] = [other_form]
+    if turn:
+        others = [partial(other, turn) for other in other_euler_forms(group)]
+    margin = _NEXT * (turn or TURN["rad"]) / TURN["rad"]
 
     def apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
         step = one - other
         return np.linalg.norm(step - turn * np.round(step / turn) if turn else step, axis=-1)
 
-    for episode, motion in zip(selection.episodes, motions, strict=True):
-        own = motion[:, columns]
-        forms = np.stack([own, other_euler_angles(own, turn) if turn else other_form(own)])
-        which = np.zeros(len(own), dtype=int)
-        steps = apart(forms[:, None, 1:], forms[:, :-1])  # of each form now from each before
-        for t in range(1, len(own)):
-            k = which[t - 1]
-            changes = steps[1 - k, k, t - 1] < steps[k, k, t - 1] - margin
-            which[t] = 1 - k if changes else k
-        if np.any(which):
-            passed.append(episode)
-        near, far = apart(forms[:, 0], first)
-        if far < near - margin:
-            which = 1 - which
-            turned.append(episode)
-        if not turn and abs(far - near) < _NEXT and max(far, near) > 1:
+    own = [motion[:, columns] for motion in motions]
+    best = min((_in_forms(own, o, apart, margin) for o in others), key=lambda each: each.leaps)
+    for i, episode in enumerate(episodes):
+        near, far = best.near[i], best.far[i]
+        halfway = not turn and abs(far - near) < _NEXT and max(far, near) > 1
+        if halfway or (len(others) > 1 and i in best.turned and far > turn / TURN["rad"]):
             raise InvalidDemonstrationsError(
-                f"episode {episode} starts half a turn from {selection.episodes[0]} in {what}: "
+                f"episode {episode} starts half a turn from {episodes[0]} in {what}: "
                 "which way lies between them cannot be told; leave one out (--leave-out)"
             )
-        motion[:, columns] = forms[which, np.arange(len(own))]
-    other = "sign" if len(group) == 4 else "numbers of the same turn"
+    for motion, frames in zip(motions, best.frames, strict=True):
+        motion[:, columns] = frames
+    sign = "sign" if len(group) == 4 else "numbers of the same turn"
     changed = "change their sign within the motion, which is one attitude"
-    taken = f"have the other {other}, and are taken as the same attitude"
+    taken = f"have the other {sign}, and are taken as the same attitude"
     if turn:
-        other = "other angles of the same attitude"
-        changed = f"change to the {other} within the motion, and are continued"
+        changed = "change to the other angles of the same attitude within the motion, and are "
+        changed += "continued"
         taken = "are taken as the same attitude's other angles"
-    for episodes, says in ((passed, changed), (turned, taken)):
-        if episodes:
-            yield f"{listed(episodes)}: {what} {says}"
+    for those, says in ((best.passed, changed), (best.turned, taken)):
+        if those:
+            yield f"{listed([episodes[i] for i in those])}: {what} {says}"
 
 
 def _align_angle(
-    selection: Selection, motions: Sequence[np.ndarray], channel: int, limits: RobotLimits | None
+    form: PlanFormat,
+    episodes: Sequence[str],
+    motions: Sequence[np.ndarray],
+    channel: int,
+    limits: RobotLimits | None,
+    *,
+    known: bool,
+    fixed: int,
 ) -> Iterator[str]:
-    name, turn = selection.names[channel], TURN[selection.units[channel]]
-    low, high = _range(name, limits)
-    whole = whole_circles(selection.names, selection.units)
+    """Continue an angle across the end of its range, and start all episodes in one turn.
+
+    What is not `known` to be an angle is one where it passes the end of a range smoothly.
+    """
+    name, unit = form.names[channel], form.units[channel]
+    turn, (low, high) = TURN[unit], _range(name, limits)
+    left = (_NEXT if known else _NOISE) * turn / TURN["rad"]
     passed = list[str]()
-    for episode, motion in zip(selection.episodes, motions, strict=True):
-        unwrapped = _continued(motion[:, channel], turn)
+    for episode, motion in zip(episodes, motions, strict=True):
+        unwrapped = _continued(motion[:, channel], turn, left)
         if np.any(unwrapped != motion[:, channel]):
             passed.append(episode)
         motion[:, channel] = unwrapped
         step = np.abs(np.diff(unwrapped))
-        if (np.isfinite(low) or name in whole) and step.max() > turn / 2:
+        if (np.isfinite(low) or name in form.periodic) and step.max() > turn / 2:
             raise InvalidDemonstrationsError(
-                f"episode {episode}: {name} steps by {step.max():.3g} {selection.units[channel]} "
+                f"episode {episode}: {name} steps by {step.max():.3g} {unit} "
                 f"at frame {int(np.argmax(step)) + 1}, which no joint does in one frame; mend that "
                 "frame, or drop that episode (--leave-out)"
             )
     if passed:
         yield f"{listed(passed)}: {name} passes the end of its range, and is continued"
+    elif not known:
+        return
     spans = np.array([[m[0, channel], m[:, channel].min(), m[:, channel].max()] for m in motions])
-    shifts = _shifts(spans, turn, low, high)
+    shifts = _shifts(spans, turn, low, high, fixed)
     if shifts is None:
         raise InvalidDemonstrationsError(
             f"{name} starts all round the circle, from {spans[:, 0].min():.3g} to "
-            f"{spans[:, 0].max():.3g} {selection.units[channel]}: which of two turns an episode is "
+            f"{spans[:, 0].max():.3g} {unit}: which of two turns an episode is "
             "in cannot be told; import those apart that start elsewhere (--leave-out)"
         )
     for shift in sorted(set(shifts.tolist()) - {0}):
-        moved = [e for e, k in zip(selection.episodes, shifts, strict=True) if k == shift]
+        moved = [e for e, k in zip(episodes, shifts, strict=True) if k == shift]
         turns = f"{abs(shift)} turn{'s' * (abs(shift) > 1)} {'higher' if shift > 0 else 'lower'}"
         yield f"{listed(moved)}: {name} is taken {turns}, as the others have it: the same pose"
     for motion, shift in zip(motions, shifts, strict=True):
@@ -212,8 +345,11 @@ def _range(name: str, limits: RobotLimits | None) -> tuple[float, float]:
     return -np.inf, np.inf
 
 
-def _continued(values: Channel, turn: float) -> Channel:
-    """An angle without whole turns within one frame; a switch that steps further stays."""
+def _continued(values: Channel, turn: float, beside: float) -> Channel:
+    """An angle without whole turns within one frame; a switch that steps further stays.
+
+    Without the turn, a step is at most `beside` more than what the frames around it step.
+    """
     steps = np.diff(values)
     left = steps - turn * np.round(steps / turn)
     at = np.arange(len(left))
@@ -221,15 +357,17 @@ def _continued(values: Channel, turn: float) -> Channel:
     before[0], after[-1] = min(1, len(left) - 1), max(len(left) - 2, 0)
     # The smaller: one bad frame at the cut makes two large steps, which must not excuse each other.
     around = np.minimum(np.abs(left[before]), np.abs(left[after]))
-    wraps = (np.abs(steps) > turn / 2) & (np.abs(left) <= 2 * around + _NEXT * turn / TURN["rad"])
+    wraps = (np.abs(steps) > turn / 2) & (np.abs(left) <= 2 * around + beside)
     if not np.any(wraps):
         return values
     turns = np.round(steps / turn) * wraps
     return values - turn * np.concatenate([[0.0], np.cumsum(turns)])
 
 
-def _shifts(spans: Spans, turn: float, low: float, high: float) -> Int[np.ndarray, " N"] | None:
-    """Turns by which each episode is shifted; None where that cannot be told."""
+def _shifts(
+    spans: Spans, turn: float, low: float, high: float, fixed: int
+) -> Int[np.ndarray, " N"] | None:
+    """Turns by which each episode is shifted, the `fixed` first by none; None if undecided."""
     n, slack = len(spans), 1e-3 * turn
     turns = np.arange(-_MOST_TURNS, _MOST_TURNS + 1)
     fits = (spans[:, 1, None] + turns * turn >= low - slack) & (
@@ -243,15 +381,16 @@ def _shifts(spans: Spans, turn: float, low: float, high: float) -> Int[np.ndarra
     found = []
     for k in turns:
         shift = np.round((base + k * turn - spans[:, 0]) / turn).astype(int)
-        if np.all(np.abs(shift) <= _MOST_TURNS) and np.all(fits[np.arange(n), shift + _MOST_TURNS]):
+        few = np.all(np.abs(shift) <= _MOST_TURNS) and not np.any(shift[:fixed])
+        if few and np.all(fits[np.arange(n), shift + _MOST_TURNS]):
             middle = abs(float(np.mean(spans[:, 0] + shift * turn)))
             found.append((int(np.count_nonzero(shift)), middle, shift))
     if found:
         best = min(found, key=lambda each: each[:2])[2]
         if not np.any(best) or turn - gaps.max() <= turn / 2:
             return np.asarray(best)
-        if np.isinf(high):
-            return None
+    if (found or fixed) and np.isinf(high):
+        return None
     # Limits part them: each stays, or where it cannot be, is in the only turn in which it can.
     each = np.zeros(n, dtype=int)
     for i in range(n):

@@ -45,7 +45,9 @@ _ALIKE, _FAR_APART = 1.5, 20.0
 """How much takes of one task may differ, and times apart from which two plausible units are two.
 Ours."""
 _MATRIX = re.compile(r"(?P<stem>.*?)[_\[ ]*(?P<row>[0-4])[,_]?(?P<column>[0-4])\]?")
-_TURNS = r"yaw|roll|pitch|angle|winkel|mcp|pip|dip|cmc|flex(ion)?|abd(uction)?|azimuth|heading"
+_TURNS = (
+    r"yaw|roll|pitch|rotation|angle|winkel|mcp|pip|dip|cmc|flex(ion)?|abd(uction)?|azimuth|heading"
+)
 _ANGLE_ALWAYS = re.compile(rf"(^|[^a-z])({_TURNS})s?($|[^a-z])", re.I)
 """Names of angles, whatever else stands beside: `gripper_yaw`, `index_finger_mcp`."""
 _ANGLE = re.compile(

@@ -357,8 +357,8 @@ class Workspace:
         if left_out := result.preview.inspection.selection.left_out:
             source = f"{source}, without what moves as well: {left_out}"
         if append:
-            before = self.demonstrations
-            demonstrations, n_before = appended(before, demonstrations), before.n
+            n_before = self.demonstrations.n
+            demonstrations = appended(self.demonstrations, demonstrations, self.manifest.robot)
             source = f"{source}, appended to {n_before}"
         self.import_demonstrations(demonstrations, source)
         return n_before

@@ -1,0 +1,117 @@
+"""Recordings of another day, in the turns, signs and units of another day."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+from prior_reinforce.arm.recordings import appended
+from prior_reinforce.arm.robots import robot_limits
+from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.plans.whole_turns import attitudes
+
+T = np.arange(61) / 60
+S = 10 * T**3 - 15 * T**4 + 6 * T**5
+UR = (
+    "shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint",
+    "wrist_1_joint", "wrist_2_joint", "wrist_3_joint",
+)  # fmt: skip
+N = 3
+
+
+def demonstrations(names, unit, motion, first=0):
+    """Three of what `motion(i)` returns."""
+    plans = np.array([motion(i) for i in range(first, first + N)], dtype=float)
+    units = (unit,) * len(names) if isinstance(unit, str) else tuple(unit)
+    form = PlanFormat(names, units, 0.02, attitudes=attitudes(names) if unit == "1" else ())
+    outcomes = [[0.8 + 0.05 * i, 0.1 * (-1) ** i] for i in range(first, first + N)]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return Demonstrations(plans, np.array(outcomes), form)
+
+
+def quaternion(i):
+    half = (1.3 + (0.2 + 0.03 * i) * S[:, None]) / 2
+    return np.hstack([np.sin(half) * [0.6, 0.64, 0.48], np.cos(half)])
+
+
+def kuka(i):
+    return np.array([0.2, 1.5, 0.3]) + S[:, None] * [0.1, -0.2 - 0.03 * i, 0.05]
+
+
+def other_kuka(angles):
+    return angles * [1, -1, 1] + [-np.pi, np.pi, np.pi]
+
+
+def yaw(i):
+    return np.array([2.7 + (i >= N) + (0.3 + 0.05 * i) * S]).T
+
+
+def arm(i):
+    return np.array([0.2, -1.6, 1.6, -1.2, -1.5, 3.0]) + S[:, None] * (0.3 + 0.05 * i)
+
+
+@pytest.mark.parametrize(
+    ("names", "unit", "motion", "otherwise", "robot"),
+    [
+        (("qx", "qy", "qz", "qw"), "1", quaternion, np.negative, None),
+        (("a", "b", "c"), "rad", kuka, other_kuka, None),
+        (("yaw",), "rad", yaw, lambda y: y - 2 * np.pi, None),
+        (UR, "rad", arm, lambda q: q - 2 * np.pi * (np.arange(6) == 5), "ur5e"),
+    ],
+)
+def test_new_ones_are_aligned_with_those_in_use(names, unit, motion, otherwise, robot):
+    limits = None if robot is None else robot_limits(robot)
+    before = demonstrations(names, unit, motion)
+    more = demonstrations(names, unit, lambda i: otherwise(motion(i)), N)
+    with pytest.warns(UserWarning, match=r"new one 0, new one 1, new one 2: .*(as|have) the"):
+        joined = appended(before, more, limits)
+    np.testing.assert_array_equal(joined.plans[:N], before.plans)
+    np.testing.assert_allclose(joined.plans, [motion(i) for i in range(2 * N)], atol=1e-12)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        appended(before, demonstrations(names, unit, motion, N), limits)
+
+
+def gap(i, low, high, scale=1.0):
+    return np.column_stack([0.1 + (0.5 + 0.05 * i) * S, scale * (low + (high - low) * S)])
+
+
+@pytest.mark.parametrize(
+    ("unit", "low", "high", "factor"),
+    [
+        ("m", 0.002, 0.0045, 1000),
+        ("m", 0.0, 0.05, 1000),
+        ("m", 0.3, 0.4, 0.01),
+        ("m", 0.2, 0.3, 10),
+        ("rad", 0.02, 0.1, 180 / np.pi),
+        ("rad", 1.1, -0.4, np.pi / 180),
+    ],
+)
+def test_a_channel_in_another_unit_is_refused(unit, low, high, factor):
+    names, units = ("j1", "gap"), ("rad", unit)
+    before = demonstrations(names, units, lambda i: gap(i, low, high))
+    more = demonstrations(names, units, lambda i: gap(i, low, high, factor), N)
+    new = [f"{factor * number:.4g}" for number in (low, high)]
+    said = rf"gap goes from {new[0]} to {new[1]} {unit} in the new .* from {low:g} to {high:g} in"
+    with pytest.raises(InvalidDemonstrationsError, match=f"{said} .* \\(--units\\)"):
+        appended(before, more)
+
+
+@pytest.mark.parametrize(
+    ("unit", "ends", "later"),
+    [
+        ("m", (0.0, 0.06), (0.0, 0.6)),
+        ("rad", (0.0, 0.004), (0.0, 0.23)),
+        ("rad", (0.3, 0.31), (0.3, 0.9)),
+        ("percent", (0.0, 100.0), (0.0, 60.0)),
+        ("m", (0.0, 0.0), (0.0, 0.4)),
+    ],
+)
+def test_a_channel_that_goes_further_is_taken(unit, ends, later):
+    names, units = ("j1", "gap"), ("rad", unit)
+    before = demonstrations(names, units, lambda i: gap(i, *ends))
+    joined = appended(before, demonstrations(names, units, lambda i: gap(i, *later), N))
+    assert joined.n == 2 * N

@@ -1,0 +1,124 @@
+"""Attitudes and turns in the forms in which makers' controllers write them."""
+
+import numpy as np
+import pytest
+
+from prior_reinforce.arm.recordings.recording import Recording
+from prior_reinforce.arm.recordings.selection import select
+from prior_reinforce.arm.recordings.turns import aligned
+
+T = np.arange(100) / 100
+S = 10 * T**3 - 15 * T**4 + 6 * T**5
+N = 4
+
+
+def brought_together(names, unit, motions):
+    """Positions once aligned, in the recorded unit, and the remarks."""
+    recordings = [
+        Recording(str(i), T, np.asarray(m), tuple(names), units=(unit,) * len(names))
+        for i, m in enumerate(motions)
+    ]
+    selection, _ = aligned(select(recordings), None)
+    scale = 1.0 if unit is None else np.rad2deg(1.0)
+    return [scale * r.positions for r in selection.recordings], " / ".join(selection.remarks)
+
+
+def wrapped(angle):
+    return np.mod(angle + 180, 360) - 180
+
+
+def attitude(i, first=10.0, middle=5.0, last=20.0, way=(3.0, 30.0, 4.0)):
+    """Three angles in degrees that move a little further in each throw."""
+    return np.array([first, middle, last]) + S[:, None] * np.array(way) * (1 + 0.05 * i)
+
+
+def other(angles, *, proper):
+    half = np.array([180.0, 0.0 if proper else 180.0, 180.0])
+    return wrapped(half + angles * [1, -1, 1])
+
+
+@pytest.mark.parametrize("names", [("rx", "ry", "rz"), ("tool_rx", "tool_ry", "tool_rz")])
+@pytest.mark.parametrize("within", [True, False])
+def test_rx_ry_rz_in_degrees_are_angles_that_pass_half_a_turn_each(names, within):
+    """A rotation vector that stands at half a turn has another form; of an angle none is made."""
+    start = 178.0 if within else 182.0
+    true = [
+        attitude(i, start if i == 1 else 178.0, 5.0, 30.0, (5.0 * within, 0, 30)) for i in range(N)
+    ]
+    read, said = brought_together(names, "deg", map(wrapped, true))
+    np.testing.assert_allclose(read, true, atol=1e-9)
+    assert "rx passes the end" in said if within else "rx is taken 1 turn higher" in said
+
+
+@pytest.mark.parametrize(
+    ("names", "middle", "proper", "within"),
+    [
+        (("a", "b", "c"), 178.0, True, True),  # Doosan: ZYZ
+        (("a", "b", "c"), 178.0, True, False),
+        (("a", "b", "c"), 88.0, False, True),  # KUKA: ZYX
+        (("a", "b", "c"), 88.0, False, False),
+        (("O", "A", "T"), 178.0, True, True),
+        (("w", "p", "r"), 88.0, False, False),
+        (("alpha", "beta", "gamma"), 88.0, False, True),
+        (("psi", "theta", "phi"), -2.0, True, False),
+        (("e1", "e2", "e3"), 88.0, False, True),
+    ],
+)
+def test_other_angles_of_the_same_attitude_are_continued(names, middle, proper, within):
+    true = [attitude(i, middle=middle, way=(0, 30, 3)) for i in range(N)]
+    read = []
+    for i, each in enumerate(true):
+        beyond = each[:, 1] > middle + 2 if within else np.full(len(S), i in (1, 3))
+        read.append(np.where(beyond[:, None], other(each, proper=proper), each))
+    read, said = brought_together(names, "deg", read)
+    np.testing.assert_allclose(read, true, atol=1e-9)
+    assert "the same attitude" in said
+
+
+@pytest.mark.parametrize("names", [("a", "b", "c"), ("rx", "ry", "rz"), ("e1", "e2", "e3")])
+def test_an_attitude_that_keeps_its_form_stays(names):
+    true = [attitude(i, way=(40, 60, -30)) for i in range(N)]
+    read, said = brought_together(names, "deg", true)
+    np.testing.assert_allclose(read, true, atol=1e-9)
+    assert said == ""
+
+
+def radians(course):
+    """Two joints of throws whose third channel is that course."""
+    return [
+        np.column_stack([0.1 + 0.5 * S * (1 + 0.1 * i), 0.2 - 0.8 * S, course(i)]) for i in range(N)
+    ]
+
+
+@pytest.mark.parametrize("name", ["gripper_yaw", "Gripper Roll", "hand/gripper_rotation"])
+def test_how_a_gripper_is_turned_is_an_angle(name):
+    true = radians(lambda i: 3.1 + 0.3 * S)
+    read = [np.where([0, 0, 1], np.mod(q + np.pi, 2 * np.pi) - np.pi, q) for q in true]
+    read[1][:, 2] = true[1][:, 2] - 2 * np.pi
+    positions, said = brought_together(("j1", "j2", name), None, read)
+    np.testing.assert_allclose(positions, true, atol=1e-9)
+    assert f"{name} passes the end" in said
+
+
+@pytest.mark.parametrize("name", ["magnet", "spring", "preload"])
+@pytest.mark.parametrize(
+    "course",
+    [
+        lambda i: np.where(T < 0.8, 6.2, 0.0),
+        lambda i: np.where(T < 0.8, 6.2 * (i % 2), 6.2 * (1 - i % 2)),
+        lambda i: np.full(len(T), (0.2, 2.6, 3.9, 6.3)[i]),
+    ],
+)
+def test_a_number_without_unit_that_is_no_angle_stays(name, course):
+    true = radians(course)
+    positions, said = brought_together(("j1", "j2", name), None, true)
+    np.testing.assert_array_equal(positions, true)
+    assert said == ""
+
+
+@pytest.mark.parametrize("name", ["j3", "wrist", "q[2]", "c2", "crank"])
+def test_an_angle_without_unit_is_continued(name):
+    true = radians(lambda i: 2.9 + 0.6 * S)
+    read = [np.where([0, 0, 1], np.mod(q + np.pi, 2 * np.pi) - np.pi, q) for q in true]
+    positions, _ = brought_together(("j1", "j2", name), None, read)
+    np.testing.assert_allclose(positions, true, atol=1e-9)
