@@ -1,5 +1,7 @@
 """Words of a person, and the symmetry that they mean."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -65,6 +67,19 @@ def test_an_object_at_a_place_is_turned_about_by_kinematics():
 def test_poses_turn_with_their_attitude_or_are_shifted():
     assert declare_symmetry(POSES, 2, about="base").moves[1] == TurnPoses(vector=(3, 4, 5))
     assert declare_symmetry(POSES, 2, distance="shift").moves == (Shift(0), Shift(1))
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        replace(POSES, periodic=("rx", "ry", "rz")),  # recorded in degrees
+        PlanFormat(("x", "y", "z", "a", "b", "c"), ("m",) * 3 + ("rad",) * 3, 0.01),
+    ],
+)
+def test_poses_whose_attitude_would_stay_behind_are_refused(form):
+    with pytest.raises(ConfigurationError, match="are Euler angles"):
+        declare_symmetry(form, 2, about="base")
+    assert declare_symmetry(form, 2, distance="shift").moves == (Shift(0), Shift(1))
 
 
 def test_increments_are_played_turned_and_shifted_as_such():

@@ -69,6 +69,8 @@ def aligned(selection: Selection, limits: RobotLimits | None) -> tuple[Selection
     motions = [np.array(recording.positions) for recording in selection.recordings]
     form = replace(form, attitudes=tuple(_unit_length(form, motions)))
     form, said = align(form, selection.episodes, motions, limits, angles=degrees)
+    periodic = dict.fromkeys((*form.periodic, *(name for group in euler for name in group)))
+    form = replace(form, periodic=tuple(periodic))
     recordings = tuple(
         replace(recording, positions=motion)
         for recording, motion in zip(selection.recordings, motions, strict=True)

@@ -32,6 +32,7 @@ from prior_reinforce.plans.symmetry.moves import (
     TurnPoses,
 )
 from prior_reinforce.plans.symmetry.symmetry import Symmetry, scale_alone, shift, turn_and_scale
+from prior_reinforce.plans.whole_turns import euler_angles
 
 if TYPE_CHECKING:
     from prior_reinforce.plans.plan_format import PlanFormat
@@ -132,6 +133,14 @@ def declare_symmetry(
         return turn_and_scale(TurnJoint(joints[0], gain), centre, scale, others)
     if place := _columns(column, ("x", "y")):
         vector, quaternion = _columns(column, _VECTOR), _columns(column, _QUATERNION)
+        for group in euler_angles(form.names, form.units):
+            is_vector = {*group} == {*_VECTOR} and not {*group} <= {*form.periodic}
+            if "yaw" not in group and not is_vector:
+                raise ConfigurationError(
+                    f"{', '.join(group)} are Euler angles, and of attitudes a turn knows rotation "
+                    "vectors rx, ry, rz in radians, quaternions qw, qx, qy, qz, and yaw; record "
+                    "one of these, or take [symmetry] out"
+                )
         turn: AnyMove = TurnPoses(
             centre, (place[0], place[1]), vector or None, quaternion or None, column.get("yaw")
         )
