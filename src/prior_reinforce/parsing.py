@@ -53,7 +53,7 @@ _COMMA, _NEXT = re.compile(r"\s*(?:,|;|\band\b)\s*"), re.compile(r"(?<=[a-z])\s+
 _PLUS_MINUS = r"(?:\+-|\+/-|±)"
 _NUMBER = r"\d{1,6}(?:\.\d*)?|\.\d+"
 _A_UNIT = "|".join(
-    re.escape(each) + "(?![a-z])" * (each in ("m", "in", "s"))
+    re.escape(each) + "(?![a-z])" * (each in ("m", "in", "s", "h"))
     for each in sorted(SPELT, key=len, reverse=True)
 )
 _UNIT = f"{_A_UNIT}|"

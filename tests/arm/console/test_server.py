@@ -232,7 +232,7 @@ def operations(served):
 
 def test_whatever_is_asked_the_answer_is_a_documented_one(served, operations):
     table, headers = operations
-    assert len(table) == 24
+    assert len(table) == 25
 
     for operation in table:
         if operation.path == "/api/stop":
