@@ -22,12 +22,16 @@ from tests.attacks.classes import CLASSES, WRITERS, Attack, recordings
 from tests.attacks.harness import HELD, prepare, where
 
 ATTACKS: dict[str, tuple[Attack, int]] = {
-    **{name: (attack, 5) for name, attack in CLASSES.items()},
+    **{name: (attack, 3) for name, attack in CLASSES.items()},
     **{f"recordings: {kind}": (partial(recordings, kind), 2) for kind in WRITERS},
-    **{f"motions: {kind}": (partial(execution.attack, kind), 2) for kind in execution.KINDS},
-    "flips": (flips.attack, 5),
-    "arms": (arms.attack, 5),
-    "watching": (watching.attack, 15),
+    **{
+        # A program that hangs is waited for.
+        f"motions: {kind}": (partial(execution.attack, kind), 1 if kind == "hangs" else 2)
+        for kind in execution.KINDS
+    },
+    "flips": (flips.attack, 3),
+    "arms": (arms.attack, 3),
+    "watching": (watching.attack, 9),
     **{
         f"{how}: {name}": (partial(interruptions.attack, how, name), 1)
         for how in interruptions.HOW
