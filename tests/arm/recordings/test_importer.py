@@ -334,6 +334,9 @@ def test_ways_back_between_throws_are_named_and_outcomes_are_taken_as_they_come(
     taken = import_demonstrations(path, rests=0.5, leave_out=back).demonstrations
     np.testing.assert_allclose(taken.plans[:, -1], ENDS, atol=1e-3)
     np.testing.assert_allclose(taken.outcomes_seen[:, 0], 0.8 + 0.05 * np.arange(6))
+    given = {str(i): (0.8 + 0.05 * i, 0.1 * (-1) ** i) for i in reversed(range(6))}
+    told = import_demonstrations(path, rests=0.5, leave_out=back, outcomes=given).demonstrations
+    np.testing.assert_allclose(told.outcomes_seen, taken.outcomes_seen)
 
 
 def test_a_recorder_that_pauses_with_the_arm_is_cut_where_it_pauses(tmp_path):

@@ -183,7 +183,7 @@ def test_what_is_no_date_is_no_time(tmp_path, second):
 @pytest.mark.parametrize("mark", ["'", "’", " ", "\u00a0", "\u202f"])
 def test_marks_between_thousands_that_no_decimal_sign_is_are_passed_over(tmp_path, mark):
     path = tmp_path / "a.csv"
-    path.write_text(f"episode;x;y\n0;1{mark}012,5;-250,0\n1;980,0;12{mark}345{mark}678\n")
+    path.write_text(f"episode;x;y\n0;1{mark}012,5;-250,0\n1;980,0;12{mark}345{mark}678,0\n")
     table = read_table(path)
     assert [table.numbers(i).tolist() for i in (1, 2)] == [[1012.5, 980.0], [-250.0, 12345678.0]]
 
@@ -200,3 +200,11 @@ def test_times_as_office_programs_write_them(tmp_path, before, after):
     path = tmp_path / "a.csv"
     path.write_text(f"time;q1\n{before};0.5\n{after};0.75\n")
     assert read_table(path).stamps(0).tolist() == [0.0, 250e6]
+
+
+def test_whole_numbers_with_blanks_between_are_no_number(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("episode;x;y\n0;100 200 300;1\n1;200 300 400;2\n")
+    table = read_table(path)
+    with pytest.raises(FileFormatError, match="'100 200 300', expected a number"):
+        table.numbers(1)

@@ -25,6 +25,7 @@ from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.outcomes import (
     OUTCOMES_FILE,
     Outcomes,
+    digits_at_end,
     in_units,
     outcomes_of,
     read_outcomes,
@@ -289,7 +290,7 @@ class Recordings:
                 raise ConfigurationError(
                     f"outcomes must be numbers by episode, such as {{'0': (0.9, 0.1)}}: {error}"
                 ) from error
-            return Outcomes.of_numbers("the given outcomes", numbers)
+            return self._in_order(Outcomes.of_numbers("the given outcomes", numbers))
         places = self.outcome_places
         path = Path(given) if given is not None else table_beside(places)
         if path is not None:
@@ -308,7 +309,9 @@ class Recordings:
         )
 
     def _in_order(self, found: Outcomes) -> Outcomes:
-        """Match outcomes of motions that one file was cut into: by name, or as they come.
+        """Match outcomes of motions that one file was cut into: by name, else in their order.
+
+        That is the order of the numbers that end their names, or of their rows.
 
         Raises:
             InvalidDemonstrationsError: They are not as many, and name none of the motions.
@@ -317,12 +320,16 @@ class Recordings:
         if not self.options.rests or not {*motions}.isdisjoint(found.episodes):
             return found
         if len(motions) == len(found.episodes):
+            numbers = [digits_at_end(name) for name in found.episodes]
+            if all(numbers) and len({*numbers}) == len(numbers):
+                order = sorted(map(int, numbers))
+                motions = [motions[order.index(int(number))] for number in numbers]
             return replace(found, episodes=tuple(motions))
         back: list[str] = []
         for before, motion in pairwise(self.episodes):
             if before.episode not in back and _goes_back(before, motion):
                 back.append(motion.episode)
-        remedy = "or cut at longer or shorter rests (--rests)"
+        remedy = "leave out those without one (--leave-out), or cut at other rests (--rests)"
         if back:
             remedy = f"{listed(back)} go back to where the motion before began: if those are no "
             remedy += f"throws, --leave-out {' '.join(back)}"

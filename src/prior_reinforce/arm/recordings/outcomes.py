@@ -414,7 +414,7 @@ def outcomes_of(
 
 def _matched(episodes: Sequence[str], names: Sequence[str]) -> dict[str, str]:
     """Name in the table by episode; a number at the end of two names matches none."""
-    numbers, there = list(map(_digits_at_end, episodes)), list(map(_digits_at_end, names))
+    numbers, there = list(map(digits_at_end, episodes)), list(map(digits_at_end, names))
     picked: dict[str, str] = {}
     for episode, number in zip(episodes, numbers, strict=True):
         if episode in names:
@@ -424,7 +424,7 @@ def _matched(episodes: Sequence[str], names: Sequence[str]) -> dict[str, str]:
     return picked
 
 
-def _digits_at_end(name: str) -> str:
-    """The number at the end of a name, without leading zeros; empty if there is none."""
+def digits_at_end(name: str) -> str:
+    """Return the number at the end of a name, without leading zeros; empty if there is none."""
     match = re.search(r"0*([0-9]+)$", name)
     return match[1] if match else ""

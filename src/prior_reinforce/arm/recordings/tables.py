@@ -41,8 +41,11 @@ _WESTERN = set("°µ²³äöüÄÖÜßàâçéèêëîïôùûñÀÉÈáíóúã
 """Non-ASCII characters in tables that a Western Excel saves in its own code page."""
 _LIST = re.compile(r"\s*[\[(]\s*[-+.\deE]+([,\s]+[-+.\deE]+)+\s*[\])]\s*")
 _DATE = re.compile(r"\d{4}-\d\d-\d\d|\d{1,2}:\d\d|\d{1,2}[/.]\d{1,2}[/.]\d{4}")
-_THOUSANDS = re.compile(r"[+-]?\d{1,3}([ '’\u00a0\u202f])\d{3}(\1\d{3})*([.,]\d*)?")
-"""Numbers whose thousands are apart by a mark that no decimal sign is: `1'012.5`, `1 012,5`."""
+_THOUSANDS = re.compile(
+    r"[+-]?\d{1,3}(?:(['’\u00a0\u202f])\d{3}(\1\d{3})*([.,]\d*)?|( \d{3})+[.,]\d+)"
+)
+"""Numbers whose thousands are apart by a mark that no decimal sign is: `1'012.5`, `1 012,5`. Whole
+numbers with blanks between are a list."""
 _MOMENT = re.compile(
     r"(\d{4})-?(\d\d)-?(\d\d)(?:[T ](\d\d):?(\d\d)(?::?(\d\d)(?:[.,](\d{1,9})\d*)?)?)?"
     r" ?(?:Z|UTC|([+-]\d\d):?(\d\d)?)?"

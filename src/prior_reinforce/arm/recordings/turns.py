@@ -65,11 +65,12 @@ def aligned(selection: Selection, limits: RobotLimits | None) -> tuple[Selection
     degrees = {name for name, unit in recorded if unit == "deg"}
     # `rx`, `ry`, `rz` are a rotation vector where they are in radians, and else Euler angles.
     euler = [g for g in euler_angles(form.names, form.units) if degrees.issuperset(g)]
-    form = replace(form, attitudes=tuple(g for g in form.attitudes if {*g} not in map(set, euler)))
+    told = [g for g in form.attitudes if {*g} in map(set, euler)]
+    form = replace(form, attitudes=tuple(g for g in form.attitudes if g not in told))
     motions = [np.array(recording.positions) for recording in selection.recordings]
     form = replace(form, attitudes=tuple(_unit_length(form, motions)))
     form, said = align(form, selection.episodes, motions, limits, angles=degrees)
-    periodic = dict.fromkeys((*form.periodic, *(name for group in euler for name in group)))
+    periodic = dict.fromkeys((*form.periodic, *(name for group in told for name in group)))
     form = replace(form, periodic=tuple(periodic))
     recordings = tuple(
         replace(recording, positions=motion)
