@@ -16,6 +16,9 @@ import numpy as np
 
 TURN: Mapping[str, float] = {"rad": 2 * math.pi, "deg": 360.0}
 """A whole turn by unit."""
+HALF = 0.01
+"""Share of a turn by which a step of half a turn may be more or less. Ours: what a wrist turns in
+one frame."""
 _WHOLE_CIRCLE = re.compile(
     r"(^|[^a-z])(yaw|roll|heading|azimuth|azimut|bearing|gier(winkel)?|roll(winkel)?)($|[^a-z])",
     re.IGNORECASE,

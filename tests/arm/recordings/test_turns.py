@@ -6,6 +6,7 @@ import pytest
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.selection import select
 from prior_reinforce.arm.recordings.turns import aligned
+from prior_reinforce.arm.robots import RobotLimits
 
 T = np.arange(100) / 100
 S = 10 * T**3 - 15 * T**4 + 6 * T**5
@@ -21,6 +22,18 @@ def brought_together(names, unit, motions):
     selection, _ = aligned(select(recordings), None)
     scale = 1.0 if unit is None else np.rad2deg(1.0)
     return [scale * r.positions for r in selection.recordings], " / ".join(selection.remarks)
+
+
+def test_joints_of_the_robot_are_no_attitude_whatever_they_are_called():
+    """A wrist's roll, pitch and yaw that start in the other angles of one attitude stay there."""
+    names, ones = ("roll", "pitch", "yaw"), np.ones(3)
+    limits = RobotLimits("wrist", "any", "made up", names, -3.5 * ones, 3.5 * ones, 9 * ones)
+    own = [np.deg2rad(attitude(i)) for i in range(N)]
+    own[1] = np.array([-np.pi, np.pi, -np.pi]) + own[1] * [1, -1, 1]
+    recordings = [Recording(str(i), T, m, names, units=("rad",) * 3) for i, m in enumerate(own)]
+    selection, _ = aligned(select(recordings), limits)
+    for recording, motion in zip(selection.recordings, own, strict=True):
+        np.testing.assert_allclose(recording.positions, motion)
 
 
 def wrapped(angle):

@@ -18,6 +18,7 @@ import numpy as np
 from prior_reinforce.arm.recordings.bounds import check_names
 from prior_reinforce.arm.recordings.clock import (
     NO_COLUMN,
+    SAME_RATE,
     Clock,
     Times,
     clock_among,
@@ -89,8 +90,8 @@ _SIDE = re.compile(
 _FEWEST, _BENDS = 20, 6
 """Frames of what moves at a rate of its own and has no times, and how often it goes through its
 range at most; ours: tables of other things jump."""
-_SAME_CLOCK, _SAME_RATE = 0.01, 0.05
-"""Shares by which two clocks, and two rates, of a recording differ at most. Ours."""
+_SAME_CLOCK = 0.01
+"""Share by which two clocks of a recording differ at most. Ours."""
 
 
 def recorded_among(
@@ -238,7 +239,7 @@ def with_rate(
     deep = [name for name in rates if "." in name]
     for name, rate in rates.items():
         first, of_first = next(iter(rates.items()))
-        if deep and given is None and abs(rate - of_first) > _SAME_RATE * of_first:
+        if deep and given is None and abs(rate - of_first) > SAME_RATE * of_first:
             raise FileFormatError(
                 f"{where}: {first} says {of_first:.4g} frames a second, but {name} {rate:.4g}; "
                 "take one: --rate"

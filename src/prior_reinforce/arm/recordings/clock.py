@@ -44,7 +44,7 @@ _QUALIFIES = re.compile(
 """Words that say what kind of time it is, and no unit."""
 _SHORTEST, LONGEST = 0.1, 60.0
 """Seconds that a throw, slide or swing is recorded for. Ours, and wide on purpose."""
-_SAME_RATE = 0.05
+SAME_RATE = 0.05
 """Rates that differ by a smaller share are one. Ours: clocks of recorders jitter and drift."""
 _APART = 3.0
 """Frames by which two clocks of one recording may differ. Ours: jitter is a frame or two."""
@@ -324,7 +324,7 @@ def hold_together(where: str, clocks: Mapping[str, Times]) -> None:
                 f"{own:.4g}; say which is the time: --time-column {name}, or {other}"
             )
         apart = np.abs((stamps - stamps[0]) * scales[0] - (used - used[0]))
-        if apart.max() > max(_SAME_RATE * (used[-1] - used[0]), _APART * period):
+        if apart.max() > max(SAME_RATE * (used[-1] - used[0]), _APART * period):
             frame = int(np.argmax(np.abs(np.diff(apart)))) + 1
             raise FileFormatError(
                 f"{where}: {name} and {other} part by {apart.max():.3g} s, most at frame {frame}; "
@@ -376,4 +376,4 @@ def _judge(
 
 
 def _same(one: float, two: float) -> bool:
-    return abs(one - two) <= _SAME_RATE * two
+    return abs(one - two) <= SAME_RATE * two

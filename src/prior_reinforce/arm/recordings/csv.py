@@ -20,6 +20,7 @@ from prior_reinforce.arm.recordings.beside import columns_beside, headed, is_clo
 from prior_reinforce.arm.recordings.clock import (
     FRAME,
     NO_COLUMN,
+    SAME_RATE,
     Clock,
     Times,
     declared_rate,
@@ -69,8 +70,6 @@ _SAYS = re.compile(
     r"([A-Za-z][A-Za-z_ ]*?)\s*[:=]\s*(\d+\.?\d*(?:[eE][-+]?\d+)?)(?![\d.:-])\s*([A-Za-zµ]*)"
 )
 """`fps: 40`, `sample rate = 1 kHz`."""
-_SAME_RATE = 0.05
-"""Share by which a given rate may differ from that of a comment. Ours."""
 _SECONDS = re.compile(r"(?P<stem>.*?)(secs?|seconds|s)")
 
 
@@ -136,7 +135,7 @@ def _declared(table: Table, said: dict[str, float], options: ReadOptions) -> dic
     """
     found = declared_rate(table.where, said, options.rate)
     own, rate = found.get("own_rate"), options.rate
-    if own and rate and abs(own - rate) > _SAME_RATE * own:
+    if own and rate and abs(own - rate) > SAME_RATE * own:
         raise ConfigurationError(
             f"{table.where} says {own:g} frames a second in its comment {found['rate_name']}, but "
             f"--rate {rate:g}; drop --rate, or correct that comment"

@@ -15,7 +15,7 @@ from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.units import is_no_angle
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.signals import noise
-from prior_reinforce.plans.whole_turns import TURN
+from prior_reinforce.plans.whole_turns import HALF, TURN
 
 _SHARE = 0.5
 """A leap is at least this part of a channel's range. Ours: a motion of 0.3 s recorded at 10 Hz
@@ -32,8 +32,6 @@ _NOISE = 6.0
 """And it moves by so many standard deviations of its noise. Ours."""
 _ALIKE = 3.0
 """Times by which it may be faster after than before. Ours."""
-_HALF = 0.01
-"""Share of a turn by which a step of half a turn may be more or less. Ours."""
 _COUNTS = (*(2.0**n for n in range(8, 25)), 360.0, 3600.0)
 """Counts at which counters and encoders start again."""
 _NEAR = 0.05
@@ -83,7 +81,7 @@ def _leaps(recording: Recording, units: Sequence[str]) -> Iterator[tuple[list[in
     if len(angles) > 1 and len(steps) > 2:
         turns = np.array([TURN[units[i]] for i in angles])
         off = np.abs(np.abs(steps[:, angles]) % turns - turns / 2)
-        half = off < _HALF * turns
+        half = off < HALF * turns
         for frame in np.flatnonzero(half.sum(axis=1) > 1).tolist():
             yield [angles[i] for i in np.flatnonzero(half[frame])], frame
     for i, name in enumerate(recording.names):

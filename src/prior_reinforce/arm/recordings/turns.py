@@ -21,6 +21,7 @@ from prior_reinforce.arm.robots.limits import RobotLimits, is_joint, with_turns
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.whole_turns import (
+    HALF,
     TURN,
     euler_angles,
     other_euler_forms,
@@ -41,9 +42,6 @@ _SAME = 1e-3
 _NOISE = 0.02
 """The same of a channel that may be no angle: a magnet's current that is switched off steps by
 about a turn too. Ours: an encoder's noise."""
-_HALF = 0.01
-"""Share of a turn by which a step of half a turn may be more or less. Ours: what a wrist turns in
-one frame."""
 _ANGLE = re.compile(
     r"joint|axis|achse|gelenk|winkel|angle|rot|turn|twist|swing|steer|roll|pitch|yaw|heading|azimut"
     r"|bearing|theta|phi|psi|alpha|beta|gamma|base|basis|waist|torso|shoulder|schulter|elbow"
@@ -108,9 +106,10 @@ def align(
     taken = {name for group in form.attitudes for name in group}
     for group in form.attitudes:
         said += _align_forms(form, episodes, motions, group)
-    euler = [g for g in euler_angles(form.names, form.units) if taken.isdisjoint(g)]
+    joints = {name for name in form.names if np.isfinite(_range(name, limits)[0])}
+    euler = [g for g in euler_angles(form.names, form.units) if (taken | joints).isdisjoint(g)]
     own = {name for group in euler for name in group}
-    for each in (*euler, *_flipping(form, motions, taken | own, limits)):
+    for each in (*euler, *_flipping(form, motions, taken | own | joints)):
         said += _align_forms(
             form, episodes, motions, each, TURN[form.units[form.names.index(each[0])]]
         )
@@ -178,19 +177,18 @@ def _start_at_two_forms(motions: Sequence[np.ndarray]) -> bool:
 
 
 def _flipping(
-    form: PlanFormat, motions: Sequence[np.ndarray], taken: set[str], limits: RobotLimits | None
+    form: PlanFormat, motions: Sequence[np.ndarray], taken: set[str]
 ) -> Iterator[tuple[str, ...]]:
     """Three angles whose first and last step by half a turn in the same frame, as no joints do."""
     for first in range(len(form.names) - 2):
         group, columns = form.names[first : first + 3], slice(first, first + 3)
         turn = TURN.get(form.units[first])
-        joints = any(np.isfinite(_range(name, limits)[0]) for name in group)
         if turn is None or {*form.units[columns]} != {form.units[first]}:
             continue
-        if joints or not taken.isdisjoint(group) or any(map(is_no_angle, group)):
+        if not taken.isdisjoint(group) or any(map(is_no_angle, group)):
             continue
         steps = [np.abs(np.diff(motion[:, columns], axis=0)) % turn for motion in motions]
-        half = [np.abs(s[:, [0, 2]] - turn / 2).max(axis=1) < _HALF * turn for s in steps]
+        half = [np.abs(s[:, [0, 2]] - turn / 2).max(axis=1) < HALF * turn for s in steps]
         if any(map(np.any, half)):
             taken = taken | {*group}
             yield group
