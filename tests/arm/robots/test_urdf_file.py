@@ -391,6 +391,7 @@ def test_a_description_is_read_with_the_right_values(run, tmp_path, given):
     base = given.options.get("base") or given.root
     held = dict(pair.split("=") for pair in given.options.get("hold", "").split() if pair)
     held = {name: float(position) for name, position in held.items()}
+    assert robot.held == held  # and so recordings are compared with it
     way, link = [], tip
     moves = {j.to: (j, j.of or (given.joints[i - 1].to if i else given.root))
              for i, j in enumerate(given.joints)}  # fmt: skip

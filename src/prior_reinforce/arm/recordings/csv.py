@@ -277,6 +277,11 @@ def _episode(
             range(len(channels)),
             clock.times,
         ),
+        beside={
+            called[i]: (float(np.nanmin(table.values[:, i])), float(np.nanmax(table.values[:, i])))
+            for i in others
+            if i not in channels and np.any(np.isfinite(table.values[:, i]))
+        },
     )
 
 

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from prior_reinforce.arm.recordings.held import check_held
 from prior_reinforce.arm.recordings.preprocessing import (
     Preprocessed,
     Preprocessing,
@@ -281,10 +282,12 @@ def inspect(
         gate: The gate's settings for that check.
 
     Raises:
-        InvalidDemonstrationsError: An episode that never moves, or is longer than the horizon.
+        InvalidDemonstrationsError: An episode that never moves, or is longer than the horizon; or a
+            joint that the robot holds stands elsewhere in it.
         ConfigurationError: Settings that contradict each other.
     """
     settings = preprocessing or Preprocessing()
+    check_held(selection.recordings, robot)
     selection, form = aligned(selection, robot)
     processed = preprocess(selection.recordings, selection.units, settings)
     form = replace(form, dt=processed.dt)

@@ -73,6 +73,8 @@ class Recording:
     the joints in order."""
     left_out: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Least and greatest value of other channels that move, by name."""
+    beside: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """The same of every other channel, moving or not, by its name with its unit."""
     named: bool = field(init=False)
     """Whether the file names the channels."""
 

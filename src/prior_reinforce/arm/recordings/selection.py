@@ -254,8 +254,15 @@ def _picked(recording: Recording, columns: list[int], joints: tuple[str, ...]) -
             )
         count = "frame is" if lost.sum() == 1 else "frames are"
         remarks += (f"{what}; {lost.sum()} {count} left out, as lost packets are",)
+    beside = dict(recording.beside)
+    for i in {*range(len(recording.names))} - {*columns}:
+        values, unit = recording.positions[:, i], recording.units[i]
+        if np.any(np.isfinite(values)):
+            name = recording.columns[i] + (f" [{unit}]" if unit else "")
+            beside[name] = float(np.nanmin(values)), float(np.nanmax(values))
     return replace(
         recording,
+        beside=beside,
         times=recording.times[~lost],
         positions=positions[~lost],
         names=joints,

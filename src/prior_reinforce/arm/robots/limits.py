@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -78,6 +78,9 @@ class RobotLimits:
     """Position-dependent velocity bounds, where the robot has them; the narrowest counts."""
     chain: Chain | None = None
     """Kinematics, for the tool tip; None where they are not known, so that no box can be kept."""
+    held: Mapping[str, float] = field(default_factory=dict)
+    """Joints that stand still, and where, in [rad] and [m]: a lift below the arm. They are within
+    `chain`."""
 
     def __post_init__(self) -> None:
         """Copy and check.

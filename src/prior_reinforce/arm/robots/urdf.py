@@ -91,6 +91,7 @@ def read_urdf(
         acceleration=acceleration,
         jerk=jerk,
         chain=kinematics,
+        held=hold,
     )
 
 

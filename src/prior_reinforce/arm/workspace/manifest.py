@@ -160,6 +160,7 @@ class _Robot(_Section, frozen=True):
     jerk: _Numbers | None = None
     kinematics: Annotated[tuple[_Nine, ...], Meta(min_length=1)] | None = None
     flange: Pose | None = None
+    held: dict[str, float] = {}
     source: str = ""
     arm: str = ""
 
@@ -360,7 +361,9 @@ class _Reader:
                 raise self.error("robot", key, "looks like degrees; give radians")
         given = {key: getattr(robot, key) for key in ("joint_names", *LIMIT_LISTS)}
         source, chain = robot.source or str(self.path), self.chain(robot)
-        return RobotLimits(task, firmware="as given", source=source, chain=chain, **given)
+        return RobotLimits(
+            task, firmware="as given", source=source, chain=chain, held=robot.held, **given
+        )
 
     def chain(self, robot: _Robot) -> Chain | None:
         """Kinematics that are given."""

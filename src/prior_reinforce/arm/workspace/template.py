@@ -210,6 +210,9 @@ def _written_out(robot: RobotLimits) -> str:
         pairs = zip(robot.chain.origins, robot.chain.axes, strict=True)
         rows = [f"  {_rounded((*origin, *axis), 12)}," for origin, axis in pairs]
         lines += ["kinematics = [", *rows, "]", f"flange = {_rounded(robot.chain.flange, 12)}"]
+    if robot.held:
+        each = ", ".join(f"{_toml(name)} = {at:g}" for name, at in robot.held.items())
+        lines.append(f"held = {{ {each} }}  # joints that stand still, as the kinematics have them")
     return "".join(f"{line}\n" for line in lines)
 
 
