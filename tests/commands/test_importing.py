@@ -186,7 +186,7 @@ def test_more_recordings_are_appended(run, folder, tmp_path):
     np.testing.assert_allclose(after.outcomes_seen[4:], [[0.7, 0.1], [0.75, 0]])
     status, _, err = run("import", folder, "more", "--append", "--no-trim")
     assert status == 2  # the same once more
-    assert "demonstration 4 so far and new one 0 are one motion" in err
+    assert "demonstration 4 so far and 0 are one motion" in err
 
 
 def test_episodes_with_odd_names_are_printed_as_text(run, folder, tmp_path, monkeypatch):

@@ -151,7 +151,7 @@ class Import(OnWorkspace):
                 if not selection.recordings:
                     raise InvalidDemonstrationsError("no episode is left; import again")
         outcomes_of(selection.episodes, known, partial=partial)  # before the work of the next line
-        inspection = self._inspected(manifest, selection)
+        inspection = self._inspected(workspace, selection)
         result = recordings.demonstrations(
             inspection, known, form, partial=partial, declared=manifest.declared
         )
@@ -178,7 +178,7 @@ class Import(OnWorkspace):
         self, workspace: Workspace, recordings: Recordings, selection: Selection, unclear: Unclear
     ) -> None:
         manifest = workspace.manifest
-        found = replace(self._inspected(manifest, selection), ambiguities=unclear)
+        found = replace(self._inspected(workspace, selection), ambiguities=unclear)
         places, episodes = recordings.outcome_places, selection.episodes
         table = self.outcomes or table_beside(places)
         known, more = self._known(manifest, recordings, unclear, may_lack=True)
@@ -225,10 +225,12 @@ class Import(OnWorkspace):
         said = ["prior-reinforce import", shlex.join(self.words), *kept, more]
         return " ".join(filter(None, said))
 
-    def _inspected(self, manifest: Manifest, selection: Selection) -> Inspection:
+    def _inspected(self, workspace: Workspace, selection: Selection) -> Inspection:
         """What becomes of recordings, as they are trimmed and resampled here."""
+        manifest = workspace.manifest
         how = Preprocessing(manifest.format.dt, self.horizon, self.trim, self.smooth)
-        return inspect(selection, how, manifest.robot, manifest.gate)
+        before = workspace.demonstrations if self.append else None
+        return inspect(selection, how, manifest.robot, manifest.gate, before)
 
     def _known(
         self, manifest: Manifest, recordings: Recordings, unclear: Unclear, *, may_lack: bool

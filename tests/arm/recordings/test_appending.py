@@ -5,7 +5,11 @@ import warnings
 import numpy as np
 import pytest
 
-from prior_reinforce.arm.recordings import appended
+from prior_reinforce.arm.recordings.appending import appended, check_scale
+from prior_reinforce.arm.recordings.inspection import inspect
+from prior_reinforce.arm.recordings.preprocessing import Preprocessing
+from prior_reinforce.arm.recordings.recording import Recording
+from prior_reinforce.arm.recordings.selection import Selection
 from prior_reinforce.arm.robots import robot_limits
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.motions import Demonstrations
@@ -30,6 +34,24 @@ def demonstrations(names, unit, motion, first=0):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return Demonstrations(plans, np.array(outcomes), form)
+
+
+def selection(names, unit, motion):
+    """Three more of them, as recorded."""
+    units = (unit,) * len(names) if isinstance(unit, str) else tuple(unit)
+    times = 0.02 * np.arange(len(T))
+    takes = [Recording(f"new {i}", times, motion(i), names) for i in range(N, 2 * N)]
+    return Selection(tuple(takes), tuple(names), units, units)
+
+
+def joined(before, more, robot=None):
+    found = inspect(more, Preprocessing(0.02, trim=False), robot, before=before)
+    form = before.format
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        new = Demonstrations(found.processed.plans, before.outcomes_seen + 0.3, form)
+    assert found.format == form
+    return appended(before, new, more.episodes), found
 
 
 def quaternion(i):
@@ -65,14 +87,14 @@ def arm(i):
 def test_new_ones_are_aligned_with_those_in_use(names, unit, motion, otherwise, robot):
     limits = None if robot is None else robot_limits(robot)
     before = demonstrations(names, unit, motion)
-    more = demonstrations(names, unit, lambda i: otherwise(motion(i)), N)
-    with pytest.warns(UserWarning, match=r"new one 0, new one 1, new one 2: .*(as|have) the"):
-        joined = appended(before, more, limits)
-    np.testing.assert_array_equal(joined.plans[:N], before.plans)
-    np.testing.assert_allclose(joined.plans, [motion(i) for i in range(2 * N)], atol=1e-12)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        appended(before, demonstrations(names, unit, motion, N), limits)
+    both, found = joined(before, selection(names, unit, lambda i: otherwise(motion(i))), limits)
+    assert found.selection.remarks
+    assert all(said.startswith("new 3, new 4, new 5: ") for said in found.selection.remarks)
+    np.testing.assert_array_equal(both.plans[:N], before.plans)
+    np.testing.assert_allclose(both.plans, [motion(i) for i in range(2 * N)], atol=1e-12)
+    if robot is not None:  # the gate sees them as they are taken in
+        assert not any(report.refused for report in found.reports)
+    assert not joined(before, selection(names, unit, motion), limits)[1].selection.remarks
 
 
 def gap(i, low, high, scale=1.0):
@@ -93,11 +115,11 @@ def gap(i, low, high, scale=1.0):
 def test_a_channel_in_another_unit_is_refused(unit, low, high, factor):
     names, units = ("j1", "gap"), ("rad", unit)
     before = demonstrations(names, units, lambda i: gap(i, low, high))
-    more = demonstrations(names, units, lambda i: gap(i, low, high, factor), N)
+    more = selection(names, units, lambda i: gap(i, low, high, factor))
     new = [f"{factor * number:.4g}" for number in (low, high)]
     said = rf"gap goes from {new[0]} to {new[1]} {unit} in the new .* from {low:g} to {high:g} in"
     with pytest.raises(InvalidDemonstrationsError, match=f"{said} .* \\(--units\\)"):
-        appended(before, more)
+        check_scale(before, more)
 
 
 @pytest.mark.parametrize(
@@ -113,5 +135,4 @@ def test_a_channel_in_another_unit_is_refused(unit, low, high, factor):
 def test_a_channel_that_goes_further_is_taken(unit, ends, later):
     names, units = ("j1", "gap"), ("rad", unit)
     before = demonstrations(names, units, lambda i: gap(i, *ends))
-    joined = appended(before, demonstrations(names, units, lambda i: gap(i, *later), N))
-    assert joined.n == 2 * N
+    assert joined(before, selection(names, units, lambda i: gap(i, *later)))[0].n == 2 * N

@@ -276,7 +276,7 @@ def test_only_demonstrations_of_one_kind_are_joined(originals):
     with pytest.raises(
         InvalidDemonstrationsError, match=r"plans of .*dt=0.02.*import all together"
     ):
-        appended(fifty, twenty)
+        appended(fifty, twenty, "abcdef")
 
 
 def test_what_is_known_of_outcomes_is_joined_too(originals):
@@ -286,7 +286,7 @@ def test_what_is_known_of_outcomes_is_joined_too(originals):
         replace(kept.only(chosen), **{name: np.full((2, 2), of) for name, of in known.items()})
         for chosen in ((0, 1), (2, 3))
     ]
-    joined = appended(*parts)
+    joined = appended(*parts, "ab")
     for name, of in known.items():
         np.testing.assert_array_equal(getattr(joined, name), np.full((4, 2), of))
 
@@ -302,9 +302,9 @@ def test_a_motion_that_comes_twice_is_refused(originals, tmp_path):
         import_demonstrations(folder)
     kept = import_demonstrations(folder, leave_out=["throw_6"]).demonstrations
     other = replace(kept, outcomes_seen=kept.outcomes_seen + 0.01)
-    said = "demonstration 0 so far and new one 0 are one motion"
+    said = "demonstration 0 so far and a are one motion"
     with pytest.raises(InvalidDemonstrationsError, match=said):
-        appended(kept, other)
+        appended(kept, other, "abcdef")
 
 
 def _day(tmp_path, parts, gap=0.0):

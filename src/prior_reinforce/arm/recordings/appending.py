@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,11 +10,9 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.arm.recordings.preprocessing import copies
-from prior_reinforce.arm.recordings.turns import align
-from prior_reinforce.arm.robots.limits import RobotLimits
+from prior_reinforce.arm.recordings.selection import Selection
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.whole_turns import TURN
 
 _FACTORS: Mapping[str, tuple[float, ...]] = {"rad": (180 / np.pi,), "m": (10.0, 100.0, 1000.0)}
 """How many times too large or small a channel is in another unit, by its own: degrees, cm, mm."""
@@ -30,13 +27,33 @@ _STARTS = 0.2
 """Part of that which suffices where the start is as many times off as the end. Ours."""
 
 
+def check_scale(before: Demonstrations, selection: Selection) -> None:
+    """Check that recordings have the columns and units of the demonstrations in use.
+
+    Raises:
+        InvalidDemonstrationsError: They have not, or a channel's numbers are so many times those in
+            use that they are in another unit.
+    """
+    form = before.format
+    for what, one, other in (
+        ("columns", form.names, selection.names),
+        ("plans in", form.units, selection.units),
+    ):
+        if one != other:
+            raise InvalidDemonstrationsError(
+                f"the demonstrations so far have {what} {one}, the new ones {other}; import all "
+                "together"
+            )
+    for what in _out_of_scale(before, [each.positions for each in selection.recordings]):
+        raise InvalidDemonstrationsError(what)
+
+
 def appended(
-    before: Demonstrations, more: Demonstrations, limits: RobotLimits | None = None
+    before: Demonstrations, more: Demonstrations, episodes: Sequence[str]
 ) -> Demonstrations:
     """Return demonstrations with more of them; the shorter motions hold their last pose.
 
-    Those in use stay as they are. The new ones are brought to the same turns and signs, as those of
-    one import are (`turns.align`), within the robot's `limits`; a warning says which.
+    Those in use stay as they are, and the new ones, `episodes`, were aligned with them (`inspect`).
 
     Raises:
         InvalidDemonstrationsError: They mean other numbers, or have a motion twice.
@@ -51,45 +68,33 @@ def appended(
                 f"the demonstrations so far have {what} {one}, the new ones {other}; import all "
                 "together"
             )
-    for what in _out_of_scale(before, more):
-        raise InvalidDemonstrationsError(what)
-    said = [f"demonstration {i} so far" for i in range(before.n)]
-    said += [f"new one {i}" for i in range(more.n)]
-    motions = [*np.array(before.plans), *np.array(more.plans)]
-    form, done = align(before.format, said, motions, limits, fixed=before.n)
-    if any(np.any(m != p) for m, p in zip(motions, before.plans, strict=False)):
-        raise InvalidDemonstrationsError(
-            f"with the new demonstrations, those so far are other turns or signs of the same poses "
-            f"({'; '.join(done)}); import all together"
-        )
-    for remark in done:
-        warnings.warn(remark, stacklevel=2)
-    new = np.stack(motions[before.n :])
-    for i, (name, unit) in enumerate(zip(form.names, form.units, strict=True)):
-        apart = np.median(new[:, 0, i]) - np.median(before.plans[:, 0, i])
-        if unit in TURN and abs(apart) > 0.9 * TURN[unit]:
-            raise InvalidDemonstrationsError(
-                f"{name} of the new demonstrations starts {apart:.3g} {unit} from where it did so "
-                "far, about a turn; import all together"
-            )
     horizon = max(before.horizon, more.horizon)
-    plans = [
-        np.pad(p, ((0, 0), (0, horizon - p.shape[1]), (0, 0)), mode="edge")
-        for p in (before.plans, new)
-    ]
-    if twice := copies(np.concatenate(plans), said):
+    plans = np.concatenate(
+        [
+            np.pad(p, ((0, 0), (0, horizon - p.shape[1]), (0, 0)), mode="edge")
+            for p in (before.plans, more.plans)
+        ]
+    )
+    called = [*(f"demonstration {i} so far" for i in range(before.n)), *episodes]
+    if twice := copies(plans, called):
         raise InvalidDemonstrationsError(twice)
     both: dict[str, Any] = {
         name: np.concatenate([getattr(before, name), getattr(more, name)])
         for name in ("outcomes_seen", "outcome_noise", "outcome_correction")
     }
-    return replace(more, plans=np.concatenate(plans), format=form, **both)
+    return replace(more, plans=plans, **both)
 
 
-def _out_of_scale(before: Demonstrations, more: Demonstrations) -> Iterator[str]:
+def _out_of_scale(
+    before: Demonstrations, motions: Sequence[Float[np.ndarray, "T D"]]
+) -> Iterator[str]:
     """Channels whose numbers are so many times those in use that they are in another unit."""
-    for i, (name, unit) in enumerate(zip(more.format.names, more.format.units, strict=True)):
-        ours, theirs = (_ends(each.plans[:, :, i]) for each in (before, more))
+    for i, (name, unit) in enumerate(zip(before.format.names, before.format.units, strict=True)):
+        # Where it starts and ends in the middle one of the motions.
+        ours, theirs = (
+            np.median([motion[[0, -1], i] for motion in each], axis=0)
+            for each in (before.plans, motions)
+        )
         largest, least = np.abs([ours, theirs]).max(), np.abs([ours, theirs]).max(axis=1).min()
         if unit == "1" or least == 0:
             continue
@@ -106,8 +111,3 @@ def _out_of_scale(before: Demonstrations, more: Demonstrations) -> Iterator[str]
                         f"about {factor:.4g} times as much or as little: one of them is in another "
                         "unit; say those of the new ones (--units), or import all together"
                     )
-
-
-def _ends(channel: Float[np.ndarray, "N H"]) -> Float[np.ndarray, "2"]:
-    """Where a channel starts and ends in the middle one of N plans."""
-    return np.median(channel[:, [0, -1]], axis=0)

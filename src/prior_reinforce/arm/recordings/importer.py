@@ -113,6 +113,7 @@ def import_demonstrations(
     gate: GateSettings | None = None,
     take_guesses: bool = False,
     declared: Callable[[PlanFormat], Symmetry | None] = lambda _: None,
+    before: Demonstrations | None = None,
     **options: Any,
 ) -> ImportResult:
     """Read, join with the outcomes, select joints, trim, resample, and preview.
@@ -133,6 +134,7 @@ def import_demonstrations(
         gate: The gate's settings for that check.
         take_guesses: Infer missing or implausible units, times and names instead of raising.
         declared: Says how motions of a format may be moved, if they may.
+        before: Demonstrations beside which these are to be, as in `inspect`.
         options: Fields of `ReadOptions`.
 
     Raises:
@@ -156,7 +158,7 @@ def import_demonstrations(
     raise_if_ambiguous(ambiguities, take_guesses=take_guesses)
     partial = not {"episodes", "leave_out"}.isdisjoint(recordings.options.given)
     outcomes_of(selection.episodes, known, partial=partial)  # before the work of the next line
-    inspection = inspect(selection, preprocessing, robot, gate)
+    inspection = inspect(selection, preprocessing, robot, gate, before)
     names = outcome_names if outcome_names is not None or not known.named else known.names
     units = tuple(outcome_units or [unit or "m" for unit in known.units])
     names = OutcomeFormat.metres(len(units)).names if names is None else names

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from prior_reinforce.arm.recordings.appending import check_scale
 from prior_reinforce.arm.recordings.held import check_held
 from prior_reinforce.arm.recordings.preprocessing import (
     Preprocessed,
@@ -25,7 +26,7 @@ from prior_reinforce.arm.robots.limits import match_joints
 from prior_reinforce.arm.robots.report import LimitReport
 from prior_reinforce.errors import ConfigurationError, InvalidPlanError
 from prior_reinforce.plans.interpolation import RATE
-from prior_reinforce.plans.motions import Plan
+from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.speeds import Channels
 from prior_reinforce.units import UNITS
@@ -271,6 +272,7 @@ def inspect(
     preprocessing: Preprocessing | None = None,
     robot: RobotLimits | None = None,
     gate: GateSettings | None = None,
+    before: Demonstrations | None = None,
 ) -> Inspection:
     """Make plans of recordings, and check each against the robot's limits, once.
 
@@ -280,15 +282,18 @@ def inspect(
         robot: Limits that every demonstration is checked against; None checks none. In units that
             the gate cannot judge, none is checked either.
         gate: The gate's settings for that check.
+        before: Demonstrations beside which these are to be, in their turns, signs and units.
 
     Raises:
-        InvalidDemonstrationsError: An episode that never moves, or is longer than the horizon; or a
-            joint that the robot holds stands elsewhere in it.
+        InvalidDemonstrationsError: As in `check_held`, `check_scale` and `aligned`; or an episode
+            that never moves, or is longer than the horizon.
         ConfigurationError: Settings that contradict each other.
     """
     settings = preprocessing or Preprocessing()
     check_held(selection.recordings, robot)
-    selection, form = aligned(selection, robot)
+    if before is not None:
+        check_scale(before, selection)
+    selection, form = aligned(selection, robot, before)
     processed = preprocess(selection.recordings, selection.units, settings)
     form = replace(form, dt=processed.dt)
     reports: tuple[LimitReport, ...] = ()

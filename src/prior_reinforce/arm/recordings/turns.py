@@ -19,6 +19,7 @@ from prior_reinforce.arm.recordings.selection import Selection
 from prior_reinforce.arm.recordings.units import is_no_angle, listed
 from prior_reinforce.arm.robots.limits import RobotLimits, is_joint, with_turns
 from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.whole_turns import (
     HALF,
@@ -52,12 +53,21 @@ _ANGLE = re.compile(
 _MOST_TURNS = 3
 
 
-def aligned(selection: Selection, limits: RobotLimits | None) -> tuple[Selection, PlanFormat]:
+def aligned(
+    selection: Selection, limits: RobotLimits | None, before: Demonstrations | None = None
+) -> tuple[Selection, PlanFormat]:
     """Return the recordings brought together, and what their channels mean; `dt` is 1 s.
 
-    The robot's joints keep to its limits, where they are known. InvalidDemonstrationsError where it
-    cannot be told which way round a joint went, or which of two turns an episode is in.
+    The robot's joints keep to its limits, where they are known, and the recordings to the turns and
+    signs of demonstrations that were there `before`, which stay as they are.
+
+    Raises:
+        InvalidDemonstrationsError: It cannot be told which way round a joint went, or which of two
+            turns an episode is in.
     """
+    shown = () if before is None else before.plans
+    episodes = [*(f"demonstration {i} so far" for i in range(len(shown))), *selection.episodes]
+    motions = [*np.array(shown), *(np.array(each.positions) for each in selection.recordings)]
     form = with_turns(PlanFormat(selection.names, selection.units, 1.0), limits)
     recorded = zip(selection.names, selection.recorded_units, strict=True)
     degrees = {name for name, unit in recorded if unit == "deg"}
@@ -65,20 +75,35 @@ def aligned(selection: Selection, limits: RobotLimits | None) -> tuple[Selection
     euler = [g for g in euler_angles(form.names, form.units) if degrees.issuperset(g)]
     told = [g for g in form.attitudes if {*g} in map(set, euler)]
     form = replace(form, attitudes=tuple(g for g in form.attitudes if g not in told))
-    motions = [np.array(recording.positions) for recording in selection.recordings]
     form = replace(form, attitudes=tuple(_unit_length(form, motions)))
-    form, said = align(form, selection.episodes, motions, limits, angles=degrees)
+    if before is not None:
+        form = replace(before.format, dt=1.0)
+    form, said = _align(form, episodes, motions, limits, angles=degrees, fixed=len(shown))
+    if any(np.any(motion != plan) for motion, plan in zip(motions, shown, strict=False)):
+        raise InvalidDemonstrationsError(
+            f"with the new demonstrations, those so far are other turns or signs of the same poses "
+            f"({'; '.join(said)}); import all together"
+        )
+    new = motions[len(shown) :]
+    for i, (name, unit) in enumerate(zip(form.names, form.units, strict=True)):
+        starts = [[motion[0, i] for motion in each] for each in (new, shown)]
+        apart = np.median(starts[0]) - np.median(starts[1]) if len(shown) else 0.0
+        if unit in TURN and abs(apart) > 0.9 * TURN[unit]:
+            raise InvalidDemonstrationsError(
+                f"{name} of the new demonstrations starts {apart:.3g} {unit} from where it did so "
+                "far, about a turn; import all together"
+            )
     periodic = dict.fromkeys((*form.periodic, *(name for group in told for name in group)))
     form = replace(form, periodic=tuple(periodic))
     recordings = tuple(
         replace(recording, positions=motion)
-        for recording, motion in zip(selection.recordings, motions, strict=True)
+        for recording, motion in zip(selection.recordings, new, strict=True)
     )
     remarks = (*selection.remarks, *said)
     return replace(selection, recordings=recordings, remarks=remarks), form
 
 
-def align(
+def _align(
     form: PlanFormat,
     episodes: Sequence[str],
     motions: Sequence[np.ndarray],

@@ -337,6 +337,7 @@ class Workspace:
             gate=manifest.gate,
             take_guesses=take_guesses,
             declared=manifest.declared,
+            before=self.demonstrations if append else None,
             **options,
         )
         self.take_in(result, str(source), append=append)
@@ -358,7 +359,7 @@ class Workspace:
             source = f"{source}, without what moves as well: {left_out}"
         if append:
             n_before = self.demonstrations.n
-            demonstrations = appended(self.demonstrations, demonstrations, self.manifest.robot)
+            demonstrations = appended(self.demonstrations, demonstrations, result.episodes)
             source = f"{source}, appended to {n_before}"
         self.import_demonstrations(demonstrations, source)
         return n_before
