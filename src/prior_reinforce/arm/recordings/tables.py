@@ -221,14 +221,13 @@ def _number(text: str, decimal: str = ".") -> float:
 
     A point beside a decimal comma would separate thousands: no number, rather than another one.
     """
-    if _THOUSANDS.fullmatch(text):
-        text = re.sub(r"[ '’\u00a0\u202f]", "", text)
     if "_" in text or (decimal == "," and "." in text):
         return math.nan
     try:
-        return float(text.replace(decimal, "."))
+        return float(text if decimal == "." else text.replace(decimal, "."))
     except ValueError:
-        return math.nan
+        apart = _THOUSANDS.fullmatch(text)
+        return _number(re.sub(r"[ '’\u00a0\u202f]", "", text), decimal) if apart else math.nan
 
 
 def _as_iso(text: str) -> str:
