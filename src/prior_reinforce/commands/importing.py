@@ -138,7 +138,6 @@ class Import(OnWorkspace):
         form = manifest.outcome_format
         known, more = self._known(manifest, recordings, unclear, may_lack=at_terminal)
         _settle(unclear + more, at_terminal=at_terminal)
-        partial = bool(self.options.episodes or self.options.leave_out)
         if at_terminal:
             source = recordings.source
             answers = ask_for_outcomes(workspace.folder, source, known, selection, form)
@@ -146,15 +145,13 @@ class Import(OnWorkspace):
                 print(
                     f"outcomes kept in {answers.where}; to import again: --outcomes {answers.where}"
                 )
-                known, partial = answers, True
+                known = answers
                 selection = selection.without(missing_outcomes(selection.episodes, answers))
                 if not selection.recordings:
                     raise InvalidDemonstrationsError("no episode is left; import again")
-        outcomes_of(selection.episodes, known, partial=partial)  # before the work of the next line
+        outcomes_of(selection.episodes, known)  # before the work of the next line
         inspection = self._inspected(workspace, selection)
-        result = recordings.demonstrations(
-            inspection, known, form, partial=partial, declared=manifest.declared
-        )
+        result = recordings.demonstrations(inspection, known, form, declared=manifest.declared)
         print_checked(result.preview.text)
         n_before = workspace.take_in(result, str(recordings.source), append=self.append)
         if n_before:
@@ -238,12 +235,10 @@ class Import(OnWorkspace):
         """The outcomes of a table or the recordings, in the manifest's units."""
         names = manifest.outcome_format.names
         try:
-            found = recordings.outcomes(self.outcomes, names)
+            found = recordings.outcomes(self.outcomes, names, may_lack=may_lack)
         except InvalidDemonstrationsError as missing:
-            if not may_lack:
-                raise_if_ambiguous(unclear, also=str(missing))
-                raise
-            found = Outcomes.none(names)
+            raise_if_ambiguous(unclear, also=str(missing))
+            raise
         return in_units(found, manifest.outcome_format.units, self.outcome_unit)
 
 

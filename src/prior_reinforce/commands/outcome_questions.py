@@ -64,7 +64,7 @@ def ask_for_outcomes(
     outcomes: dict[str, Place] = {}
     for episode in selection.episodes:
         with suppress(InvalidDemonstrationsError):
-            place, sd = outcomes_of([episode], known, partial=True)
+            place, sd = outcomes_of([episode], known)
             outcomes[episode] = (*place[0].tolist(), float(sd[0, 0]))
     missing = [episode for episode in selection.episodes if episode not in outcomes]
     if not missing:

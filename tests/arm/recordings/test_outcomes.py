@@ -15,6 +15,7 @@ from prior_reinforce.errors import (
     InvalidDemonstrationsError,
     UnclearUnitsError,
 )
+from prior_reinforce.units import base_of
 from tests.arm.recordings.recorded import OUTCOMES, write_csv, write_outcomes
 
 
@@ -119,7 +120,7 @@ def test_episodes_are_matched_by_their_number(recording, tmp_path):
 
 def test_numbers_that_two_names_share_match_nothing(recording, tmp_path):
     named = {f"a{name}": values for name, values in OUTCOMES.items()} | {"b3": (2.0, 2.0)}
-    with pytest.raises(InvalidDemonstrationsError, match="no outcome for episodes 3 in"):
+    with pytest.raises(InvalidDemonstrationsError, match="names episodes a3, b3 that were not found"):
         import_demonstrations(recording, outcomes=write_outcomes(tmp_path, named))
 
 
@@ -253,7 +254,7 @@ def test_metres_that_are_said_may_be_as_far_as_a_bat_strikes(recording, tmp_path
         import_demonstrations(recording, outcomes=path)  # a table that we wrote is headed so
     bare = table(tmp_path, "\n".join(["episode,x,y", *rows]))
     assert import_demonstrations(recording, outcomes=bare, outcome_unit="m").demonstrations.n == 6
-    with pytest.raises(UnclearUnitsError, match="it looks like cm"):
+    with pytest.raises(InvalidDemonstrationsError, match=r"x 10.05, y 0.14, .* --outcome-unit if"):
         import_demonstrations(recording, outcomes=bare)
 
 
@@ -399,9 +400,80 @@ def test_what_is_written_otherwise_is_told_with_what_to_write(recording, tmp_pat
         read_outcomes(table(tmp_path, text), ["x", "y"])
 
 
-def test_a_unit_that_one_component_looks_like_is_not_proposed_for_all(recording, tmp_path):
-    """Metres ahead and centimetres aside: were all in cm, x would be 8 mm."""
-    rows = [f"{name},{x},{100 * y}" for name, (x, y) in OUTCOMES.items()]
-    path = table(tmp_path, "\n".join(["episode,x,y", *rows]))
-    with pytest.raises(InvalidDemonstrationsError, match=r"the head, .* x \[m\], y \[cm\]"):
+def rows(scale=(1, 1), first=0, name="{}"):
+    """Lines of the throws' outcomes, in other units or numbered from another number."""
+    return [
+        f"{name.format(int(episode) + first)},{scale[0] * x:.6g},{scale[1] * y:.6g}"
+        for episode, (x, y) in OUTCOMES.items()
+    ]
+
+
+@pytest.mark.parametrize("unit", ["mm", "cm"])
+def test_lengths_of_one_table_have_one_unit(recording, tmp_path, unit):
+    scale = 1 / base_of(unit)[1]
+    path = table(tmp_path, "\n".join(["episode,x,y", *rows((scale, scale))]))
+    with pytest.raises(UnclearUnitsError, match=f"like {unit}") as asked:
+        import_demonstrations(recording, outcomes=path)
+    assert asked.value.options == f"--outcome-unit {unit}"
+    seen = import_demonstrations(recording, outcomes=path, outcome_unit=unit)
+    np.testing.assert_allclose(seen.demonstrations.outcomes_seen, list(OUTCOMES.values()))
+
+
+@pytest.mark.parametrize("scale", [(1, 100), (100, 1), (1, 1000)])
+def test_lengths_in_two_units_have_to_be_said_each(recording, tmp_path, scale):
+    path = table(tmp_path, "\n".join(["episode,x,y", *rows(scale)]))
+    with pytest.raises(InvalidDemonstrationsError, match=r"several units: .* in the head"):
+        import_demonstrations(recording, outcomes=path)
+    units = [{1: "m", 100: "cm", 1000: "mm"}[each] for each in scale]
+    head = f"episode,x [{units[0]}],y [{units[1]}]"
+    path = table(tmp_path, "\n".join([head, *rows(scale)]))
+    seen = import_demonstrations(recording, outcomes=path).demonstrations.outcomes_seen
+    np.testing.assert_allclose(seen, list(OUTCOMES.values()))
+
+
+@pytest.mark.parametrize("options", [{}, {"leave_out": ["0"]}])
+def test_rows_that_are_numbered_otherwise_are_not_taken_for_their_neighbours(
+    recording, tmp_path, options
+):
+    path = table(tmp_path, "\n".join(["episode,x,y", *rows(first=1)]))
+    with pytest.raises(InvalidDemonstrationsError, match=r"begins with 1, and they with 0: renumb"):
+        import_demonstrations(recording, outcomes=path, **options)
+    path = table(tmp_path, "\n".join(["episode,x,y", *rows(first=1)[:5]]))
+    with pytest.raises(InvalidDemonstrationsError, match=r"begins with 1, and they with 0: renumb"):
+        import_demonstrations(recording, outcomes=path)
+
+
+def test_some_episodes_may_be_asked_for_with_a_table_of_more(recording, tmp_path):
+    path = table(tmp_path, "\n".join(["episode,x,y", *rows(), "17,1,0"]))
+    assert import_demonstrations(recording, outcomes=path, episodes=["0", "3"]).episodes == (
+        "0",
+        "3",
+    )
+
+
+@pytest.mark.parametrize(
+    ("head", "signs"),
+    [("ahead,left", (1, 1)), ("ahead,right", (1, -1)), ("right,x", (-1, 1)), ("x,y", (1, 1))],
+)
+def test_columns_may_be_called_by_where_they_count_up_to(recording, tmp_path, head, signs):
+    of = {"right": 1, "left": 1, "y": 1, "ahead": 0, "x": 0}
+    places = [
+        (episode, [OUTCOMES[episode][of[n]] for n in head.split(",")]) for episode in OUTCOMES
+    ]
+    said = [f"{e},{a * signs[0]},{b * signs[1]}" for e, (a, b) in places]
+    path = table(tmp_path, "\n".join([f"episode,{head}", *said]))
+    result = import_demonstrations(recording, outcomes=path, outcome_names=("x", "y"))
+    np.testing.assert_allclose(result.demonstrations.outcomes_seen, list(OUTCOMES.values()))
+    assert ("right is -y" in result.preview.text) == ("right" in head)
+
+
+def test_a_printed_minus_is_read(recording, tmp_path):
+    text = "\n".join(["episode,x,y", *rows()])
+    seen = import_demonstrations(recording, outcomes=table(tmp_path, text.replace("-", "\u2212")))
+    np.testing.assert_allclose(seen.demonstrations.outcomes_seen, list(OUTCOMES.values()))
+
+
+def test_a_cell_with_a_word_is_to_be_written_as_a_number(recording, tmp_path):
+    path = table(tmp_path, "\n".join(["episode,x,y", *rows()[:-1], "5,1.05,0.05 left"]))
+    with pytest.raises(FileFormatError, match=r"'0.05 left'.* plain number"):
         import_demonstrations(recording, outcomes=path)

@@ -25,7 +25,6 @@ from prior_reinforce.arm.recordings.naming import find_channels, numbered_like
 from prior_reinforce.arm.recordings.outcomes import (
     OUTCOMES_FILE,
     SD,
-    Outcomes,
     in_units,
     missing_outcomes,
     outcomes_of,
@@ -251,15 +250,12 @@ class Imports:
         if joints is not None and first.named and _needs_choice(joints, first.names):
             raise _OtherNamesError(form.names, first.names)
         selection = recordings.select(*own)
-        try:
-            known = recordings.outcomes(None, names)
-        except InvalidDemonstrationsError:
-            known = Outcomes.none(names)
+        known = recordings.outcomes(None, names, may_lack=True)
         known, unclear = in_units(known, manifest.outcome_format.units, None)
         unclear += recordings.ambiguities + selection.ambiguities
         missing = missing_outcomes(selection.episodes, known)
         placed = [episode for episode in selection.episodes if episode not in missing]
-        places, sds = outcomes_of(placed, known, partial=True)
+        places, sds = outcomes_of(placed, known)
         rows = dict(zip(placed, np.column_stack([places, sds[:, :1]]).tolist(), strict=True))
         return _Found(recordings, selection, rows, unclear)
 

@@ -25,6 +25,7 @@ from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.outcomes import (
     OUTCOMES_FILE,
     Outcomes,
+    check_rows,
     digits_at_end,
     in_units,
     outcomes_of,
@@ -156,14 +157,13 @@ def import_demonstrations(
         known, unclear = in_units(known, outcome_units, outcome_unit)
         ambiguities += unclear
     raise_if_ambiguous(ambiguities, take_guesses=take_guesses)
-    partial = not {"episodes", "leave_out"}.isdisjoint(recordings.options.given)
-    outcomes_of(selection.episodes, known, partial=partial)  # before the work of the next line
+    outcomes_of(selection.episodes, known)  # before the work of the next line
     inspection = inspect(selection, preprocessing, robot, gate, before)
     names = outcome_names if outcome_names is not None or not known.named else known.names
     units = tuple(outcome_units or [unit or "m" for unit in known.units])
     names = OutcomeFormat.metres(len(units)).names if names is None else names
     form = OutcomeFormat(tuple(names), units)
-    return recordings.demonstrations(inspection, known, form, partial=partial, declared=declared)
+    return recordings.demonstrations(inspection, known, form, declared=declared)
 
 
 def inspect_recordings(
@@ -229,6 +229,8 @@ class Recordings:
     options: ReadOptions
     episodes: tuple[Recording, ...]
     """Those that were asked for, in order."""
+    there: tuple[str, ...]
+    """Names of all episodes of the source."""
 
     @property
     def ambiguities(self) -> tuple[Ambiguity, ...]:
@@ -273,16 +275,20 @@ class Recordings:
         self,
         given: str | os.PathLike[str] | Mapping[str, Sequence[float]] | None = None,
         names: Sequence[str] | None = None,
+        *,
+        may_lack: bool = False,
     ) -> Outcomes:
         """Find outcomes: those given, a table beside the recordings, or the recordings' own.
 
         Args:
             given: A table, or numbers by episode.
             names: Components wanted, in order; None takes them as they stand.
+            may_lack: Where there are none, return none instead of raising.
 
         Raises:
             ConfigurationError: The given outcomes are not numbers.
-            InvalidDemonstrationsError: There are no outcomes, or a component is missing.
+            InvalidDemonstrationsError: There are no outcomes, a component is missing, or a row is
+                of no episode of the source.
             FileFormatError: The table is missing or damaged.
         """
         if isinstance(given, Mapping):
@@ -301,6 +307,8 @@ class Recordings:
         own = {r.episode: r.outcome.tolist() for r in self.episodes if r.outcome is not None}
         if own:
             return Outcomes.of_numbers("the recording itself", own)
+        if may_lack:
+            return Outcomes.none(names or ())
         above = table_beside([place.parent for place in places])
         hint = f" ({above} is not beside them: name it with --outcomes if it is theirs)"
         raise InvalidDemonstrationsError(
@@ -316,10 +324,13 @@ class Recordings:
         That is the order of the numbers that end their names, or of their rows.
 
         Raises:
-            InvalidDemonstrationsError: They are not as many, and name none of the motions.
+            InvalidDemonstrationsError: They are not as many, and name none of the motions; or as in
+                `check_rows`.
         """
         motions = [recording.episode for recording in self.episodes]
         if not self.options.rests or not {*motions}.isdisjoint(found.episodes):
+            if self.options.episodes is None:  # else the table may be of other sources, too
+                check_rows(found, self.there)
             return found
         if len(motions) == len(found.episodes):
             numbers = [digits_at_end(name) for name in found.episodes]
@@ -346,7 +357,6 @@ class Recordings:
         outcomes: Outcomes,
         form: OutcomeFormat,
         *,
-        partial: bool,
         declared: Callable[[PlanFormat], Symmetry | None] = lambda _: None,
     ) -> ImportResult:
         """Join plans with outcomes.
@@ -355,14 +365,13 @@ class Recordings:
             inspection: What becomes of these recordings, or of some of them.
             outcomes: In the wanted units.
             form: What their numbers mean.
-            partial: Only some episodes were asked for, so outcomes of others are no mistake.
             declared: Says how motions of a format may be moved, if they may.
 
         Raises:
             InvalidDemonstrationsError: As in `outcomes_of`, or a motion that comes twice.
         """
         selection, processed = inspection.selection, inspection.processed
-        seen, sd = outcomes_of(selection.episodes, outcomes, partial=partial)
+        seen, sd = outcomes_of(selection.episodes, outcomes)
         if inspection.copies:
             raise InvalidDemonstrationsError(inspection.copies)
         with warnings.catch_warnings():
@@ -427,7 +436,7 @@ def read(source: str | os.PathLike[str], options: ReadOptions | None = None) -> 
         names = ", ".join(there)
         raise InvalidDemonstrationsError(f"{what} in {source}; it has {names}: name those")
     chosen = tuple(read_ones[name] for name in wanted if name in read_ones)
-    return Recordings(source, kind, options, chosen)
+    return Recordings(source, kind, options, chosen, tuple(there))
 
 
 def detect_format(source: Path) -> str:

@@ -34,7 +34,9 @@ from prior_reinforce.arm.recordings.units import (
 from prior_reinforce.arrays import Points
 from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidDemonstrationsError
 from prior_reinforce.files import as_cell, from_cell, write
-from prior_reinforce.units import base_of
+from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.units import base_of, factor, kind_of
+from prior_reinforce.wording import PLACE_WORDS, axes_of
 
 OUTCOMES_FILE = "outcomes.csv"
 SD = "sd"
@@ -48,8 +50,9 @@ _SEMICOLONS = "semicolons, where a comma is the decimal sign"
 _FAR, _FEW = 10.0, 3
 """Times as far as all others that an outcome is in another unit, and outcomes of which it is not
 yet known how far they lie apart. Ours."""
-_AT_THE_BASE = 0.2
-"""So near the base, in [m], nothing is thrown or pushed (ours)."""
+_NEAR_THE_BASE = 0.05
+"""So near the base along a component, in [m], hardly any table of outcomes stays. Ours: a throw
+straight ahead scatters as much to the side; then the units are to be said in the head."""
 SOURCE = "source"
 _NOT_COMPONENTS = (SD, SOURCE, "note", "notes", "comment", "comments")
 
@@ -80,18 +83,33 @@ class Outcomes:
     def only(self, names: Sequence[str]) -> Outcomes:
         """Return some of the components, in that order.
 
+        A column may be called by where it counts up to, as seen from the base: `ahead` is x, `left`
+        y, and `right` is y of the opposite sign.
+
         Raises:
             InvalidDemonstrationsError: One is missing.
         """
-        missing = [name for name in names if name not in self.names]
+        at, signs, said, missing = list[int](), list[float](), list[str](), list[str]()
+        axes = axes_of(OutcomeFormat(tuple(names), ("m",) * len(names)))
+        for name, axis in zip(names, axes, strict=True):
+            words = PLACE_WORDS[axis] if axis < len(PLACE_WORDS) else ()
+            found = [(own, sign) for own, sign in zip((name, *words), (1, 1, -1), strict=False)
+                     if own in self.names]  # fmt: skip
+            if not found:
+                missing.append(name)
+                continue
+            own, sign = found[0]
+            said += [f"{own} is {'-' * (sign < 0)}{name}"] * (own != name)
+            at, signs = [*at, self.names.index(own)], [*signs, float(sign)]
         if missing:
             raise InvalidDemonstrationsError(
                 f"{self.where} has no column {', '.join(missing)}; it has "
-                f"{', '.join(self.names)}: rename or add it"
+                f"{', '.join(self.names)}: rename or add it (x is ahead of the base, y to its left)"
             )
-        at = [self.names.index(name) for name in names]
+        where = f"{self.where} ({', '.join(said)})" if said else self.where
         units = tuple(self.units[i] for i in at)
-        return replace(self, values=self.values[:, at], names=tuple(names), units=units)
+        values = self.values[:, at] * np.array(signs)
+        return replace(self, where=where, values=values, names=tuple(names), units=units)
 
     @classmethod
     def none(cls, names: Sequence[str]) -> Outcomes:
@@ -236,6 +254,8 @@ def _finite(path: Path, table: Table, row: int, column: int) -> float:
     if not math.isfinite(value):
         name, cell = table.names[column], table.cells[column][row][:40]
         remedy = "measure that outcome, or empty the whole row's numbers"
+        if re.search(r"\d", cell):
+            remedy = "write a plain number there (y counts to the left)"
         if (said := _WITH_UNIT.fullmatch(cell)) and (unit := known_unit(said[2])):
             remedy = f"write {said[1]}, and the unit in the head: {name} [{unit}]"
         raise FileFormatError(
@@ -275,10 +295,17 @@ def in_units(
         )
     _refuse_odd_row(outcomes, wanted)
     reach = np.abs(outcomes.values).max(axis=0, initial=0.0, where=~np.isnan(outcomes.values))
+    unsaid = {
+        j: known_unit(spelt) or spelt
+        for j, (own, spelt) in enumerate(zip(said, wanted, strict=True))
+        if own is None and given is None and kind_of(known_unit(spelt) or spelt) == "length"
+    }
+    together = max((reach[j] for j in unsaid), default=0.0)  # lengths of one table have one unit
     scale, unclear = [], dict[str, list[str]]()
-    for name, own, spelt, largest in zip(outcomes.names, said, wanted, reach, strict=True):
-        unit = known_unit(spelt) or spelt
-        recorded = own or given or judge_unit(unit, largest) or unit
+    for j, (name, own, spelt) in enumerate(zip(outcomes.names, said, wanted, strict=True)):
+        unit, largest = known_unit(spelt) or spelt, reach[j]
+        judged = together if len({*unsaid.values()}) == 1 and j in unsaid else largest
+        recorded = own or given or judge_unit(unit, judged) or unit
         if base_of(recorded)[0] != base_of(unit)[0]:
             raise ConfigurationError(
                 f"{name} in {where} is in {recorded}, but its unit is to be {spelt}; correct "
@@ -297,8 +324,7 @@ def in_units(
             unclear.setdefault(recorded, []).append(f"{name} reaches {largest:.4g}")
         elif own is not None and given != unit and looks != unit:
             unclear.setdefault(unit, []).append(f"{name} reaches {most:.4g} {unit} ({rename})")
-    for unit in unclear:
-        _refuse_one_unit(outcomes, wanted, unit)
+    _refuse_one_unit(outcomes, wanted, unclear)
     inches = " (or inches: --outcome-unit in)"
     ambiguities = tuple(
         Ambiguity(
@@ -322,31 +348,31 @@ def in_units(
     return converted, ambiguities
 
 
-def _refuse_one_unit(outcomes: Outcomes, wanted: Sequence[str], unit: str) -> None:
-    """Refuse components in several units: were all in one, the object would lie at the base.
+def _refuse_one_unit(outcomes: Outcomes, wanted: Sequence[str], unclear: Sequence[str]) -> None:
+    """Refuse components that look like several units, of which no option can give each its own.
+
+    So do numbers of which some are plausible as they are: were all in the unit that the others look
+    like, the object would hardly leave the base along them.
 
     InvalidDemonstrationsError says what to write in the head.
     """
-    unsaid = [j for j, own in enumerate(outcomes.units) if own is None]
-    same = [base_of(known_unit(wanted[j]) or wanted[j])[0] == base_of(unit)[0] for j in unsaid]
-    if base_of(unit)[0] != "m" or len(unsaid) < 2 or not all(same):
-        return
-    values = np.abs(outcomes.values[:, unsaid])
-    far = np.nanmax(values, axis=0)
-    heads = [
-        f"{outcomes.names[j]} [{unit if judge_unit(wanted[j], most) == unit else wanted[j]}]"
-        for j, most in zip(unsaid, far, strict=True)
-    ]
-    plain = [
-        most for j, most in zip(unsaid, far, strict=True) if judge_unit(wanted[j], most) != unit
-    ]
-    together = np.nanmax(np.hypot.reduce(values, axis=1)) * base_of(unit)[1]
-    if together < _AT_THE_BASE < max(plain, default=0.0):
+    far = np.nanmax(np.abs(outcomes.values), axis=0, initial=0.0)
+    own = [known_unit(unit) or unit for unit in wanted]
+    looks = [judge_unit(unit, most) or unit for unit, most in zip(own, far, strict=True)]
+    unsaid = [j for j, unit in enumerate(outcomes.units) if unit is None]
+    several = len({kind_of(unit) for unit in unclear}) > 1
+    for unit in unclear:
+        alike = [j for j in unsaid if kind_of(own[j]) == kind_of(unit) == "length"]
+        near = [far[j] * (factor(unit, "m") or 1.0) for j in alike if looks[j] == own[j]]
+        several |= any(0 < most < _NEAR_THE_BASE for most in near)
+    if several:
+        names = [outcomes.names[j] for j in unsaid]
+        each = ", ".join(f"{outcomes.names[j]} {far[j]:.4g}" for j in unsaid)
+        heads = [f"{name} [{looks[j]}]" for name, j in zip(names, unsaid, strict=True)]
         raise InvalidDemonstrationsError(
-            f"in {outcomes.where}, {outcomes.names[unsaid[int(np.argmax(far))]]} reaches "
-            f"{far.max():.4g}, as in {unit}, but were all in {unit}, the object would lie within "
-            f"{100 * _AT_THE_BASE:g} cm of the base; say each one's unit in the head, for instance "
-            f"{', '.join(heads)}"
+            f"in {outcomes.where}, the largest numbers are {each}, which look like several units: "
+            f"say each one's in the head (if they are these: {', '.join(heads)}), or "
+            "--outcome-unit if all are in one"
         )
 
 
@@ -376,30 +402,49 @@ def missing_outcomes(episodes: Sequence[str], outcomes: Outcomes) -> list[str]:
     return [episode for episode in episodes if episode not in picked]
 
 
-def outcomes_of(
-    episodes: Sequence[str], outcomes: Outcomes, *, partial: bool
-) -> tuple[Points, Points]:
+def check_rows(outcomes: Outcomes, there: Sequence[str]) -> None:
+    """Check that every row is of one of the source's episodes, all of which are `there`.
+
+    Raises:
+        InvalidDemonstrationsError: A row is of none; so is the last if the rows are numbered from 1
+            and the episodes from 0.
+    """
+    picked = _matched(there, outcomes.episodes)
+    unknown = [name for name in outcomes.episodes if name not in picked.values()]
+    if unknown:
+        raise InvalidDemonstrationsError(
+            f"{outcomes.where} names episodes {listed(unknown)} that were not found (there are "
+            f"{listed(there)}); {_renumber(there, outcomes.episodes)}correct the names, or take "
+            "out the rows of what was not recorded"
+        )
+
+
+def _renumber(episodes: Sequence[str], rows: Sequence[str]) -> str:
+    """What to do where rows may be numbered from another number than the episodes; else empty."""
+    ours, theirs = ([digits_at_end(name) for name in names] for names in (episodes, rows))
+    if not (all(ours) and all(theirs) and ours and theirs):
+        return ""
+    first, of_table = min(map(int, ours)), min(map(int, theirs))
+    if first == of_table or len(theirs) > len(ours):
+        return ""
+    return f"the table begins with {of_table}, and they with {first}: renumber it if so; else "
+
+
+def outcomes_of(episodes: Sequence[str], outcomes: Outcomes) -> tuple[Points, Points]:
     """Return each episode's outcome in order, and its standard deviation, each (N, k).
 
     Episodes are matched by name, else by the number at the end of their names (`3` is `demo_003`).
-    With `partial`, outcomes of other episodes are no mistake.
 
     Raises:
-        InvalidDemonstrationsError: Outcomes that are missing, not finite, or of unknown episodes;
-            each is named.
+        InvalidDemonstrationsError: Outcomes that are missing or not finite; each is named.
     """
     there = outcomes.episodes
     picked, missing = _matched(episodes, there), missing_outcomes(episodes, outcomes)
     if missing:
         raise InvalidDemonstrationsError(
             f"no outcome for episodes {listed(missing)} in {outcomes.where} (it has "
-            f"{listed(there) or 'none'}); measure and add them, or leave those episodes out"
-        )
-    unknown = [name for name in there if name not in picked.values()]
-    if unknown and not partial:
-        raise InvalidDemonstrationsError(
-            f"{outcomes.where} names episodes {listed(unknown)} that were not found (there are "
-            f"{listed(episodes)}); correct the names, or record them again"
+            f"{listed(there) or 'none'}); {_renumber(episodes, there)}measure and add them, or "
+            "leave those episodes out"
         )
     rows = [there.index(picked[episode]) for episode in episodes]
     values = outcomes.values[rows]

@@ -226,8 +226,10 @@ def _number(text: str, decimal: str = ".") -> float:
     try:
         return float(text if decimal == "." else text.replace(decimal, "."))
     except ValueError:
-        apart = _THOUSANDS.fullmatch(text)
-        return _number(re.sub(r"[ '’\u00a0\u202f]", "", text), decimal) if apart else math.nan
+        plain = text.replace("\u2212", "-")  # a minus as spreadsheets and people print it
+        if _THOUSANDS.fullmatch(plain):
+            plain = re.sub(r"[ '’\u00a0\u202f]", "", plain)
+        return _number(plain, decimal) if plain != text else math.nan
 
 
 def _as_iso(text: str) -> str:
