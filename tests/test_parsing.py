@@ -393,3 +393,58 @@ def test_a_place_of_one_component_in_inches_is_said_in_words():
     assert read_place("20in ahead", of("in", names=["distance"])) == pytest.approx([20.0])
     assert read_place("20 behind", of("in", names=["distance"])) == pytest.approx([-20.0])
     np.testing.assert_allclose(read_place("50.8cm ahead, 2in left", of("in", "in")), [20.0, 2.0])
+
+
+@pytest.mark.parametrize(
+    ("text", "units", "place"),
+    [
+        ("1,20 0,3", "mm", [1.2, 0.3]),
+        ("1,2m 30cm", "mm", [1.2, 0.3]),
+        ("1.2, 0.3", "mm", [1.2, 0.3]),
+        ("1.2 \u22120.3", "mm", [1.2, -0.3]),
+        ("0,9 s", "s", [0.9]),
+        ("0,9", "s", [0.9]),
+        ("0.92,0.1 m", "mm", [0.92, 0.1]),
+    ],
+)
+def test_decimal_commas_of_a_place_are_told_by_how_many_numbers_there_are(text, units, place):
+    np.testing.assert_allclose(read_place(text, of(*units)), place)
+
+
+def test_what_may_be_a_thousand_is_not_read_as_a_decimal_number():
+    for words in ("1,500 mm long", "2 cm left, 1,500 mm long", "1,500 long"):
+        with pytest.raises(InvalidFeedbackError, match=r"may be a thousand; write 1500, or 1\.500"):
+            from_words(words, METRES)
+    with pytest.raises(InvalidFeedbackError, match="may be a thousand"):
+        read_place("1,500 0,300", METRES)
+    assert from_words("0,500 m long", METRES).error_seen == pytest.approx([0.5, 0])
+    assert from_words("5,5 cm long, 1,25cm left", METRES).error_seen == pytest.approx(
+        [0.055, 0.0125]
+    )
+
+
+@pytest.mark.parametrize(
+    ("unit", "goal", "words", "error"),
+    [
+        ("pins", "7 pins", "3 pins high", 3.0),
+        ("m/s", "3.2 m/s", "0.2 m/s low", -0.2),
+        ("N", "12 N", "2-4 N low", -3.0),
+    ],
+)
+def test_a_unit_of_the_task_s_own_is_read_as_it_is_printed(unit, goal, words, error):
+    form = OutcomeFormat(("out",), (unit,))
+    place = read_place(goal, form)
+    assert say_place(place, form) == f"out {goal}"
+    np.testing.assert_allclose(from_words(words, form).error_seen, [error])
+    pair = OutcomeFormat(("x", "out"), ("m", unit))
+    np.testing.assert_allclose(read_place(f"0.9m, {goal}", pair), [0.9, *place])
+
+
+def test_a_number_without_a_unit_is_printed_without_one():
+    assert say_place([7.0], OutcomeFormat(("pins",), ("1",))) == "pins 7"
+
+
+def test_the_sign_that_a_word_was_given_is_said_where_it_has_none_of_its_own():
+    bearing = OutcomeFormat(("bearing",), ("deg",))
+    assert from_words("5 deg right", bearing).said == "5 deg right (bearing -5 deg)"
+    assert from_words("5cm right", METRES).said == "5cm right"

@@ -14,6 +14,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -52,26 +53,54 @@ _RANGE = re.compile(r"(?<=[\da-z\"°.])\s*(?:–|-|\bto\b)\s*(?=\.?\d)")
 _COMMA, _NEXT = re.compile(r"\s*(?:,|;|\band\b)\s*"), re.compile(r"(?<=[a-z])\s+(?=\.?\d)")
 _PLUS_MINUS = r"(?:\+-|\+/-|±)"
 _NUMBER = r"\d{1,6}(?:\.\d*)?|\.\d+"
-_A_UNIT = "|".join(
-    re.escape(each) + "(?![a-z])" * (each in ("m", "in", "s", "h"))
-    for each in sorted(SPELT, key=len, reverse=True)
-)
-_UNIT = f"{_A_UNIT}|"
-_TERM = re.compile(
-    rf"(?:(?:(?P<least>{_NUMBER})\s*(?P<least_unit>{_UNIT})\s*-\s*)?"
-    rf"(?P<value>{_NUMBER})\s*(?P<unit>{_UNIT})\s*"
-    rf"(?:{_PLUS_MINUS}\s*(?P<sd>{_NUMBER})\s*(?P<sd_unit>{_UNIT})\s*)?)?"
-    r"(?:to the )?(?P<word>[a-z]+)"
-)
-"""`5-7 cm long`, `5 +- 0.5 cm long`, `long`."""
 _LENGTHS = "|".join(re.escape(each) for each, unit in SPELT.items() if kind_of(unit) == "length")
-_BARE_TERM = re.compile(rf"(?P<value>{_NUMBER})\s*(?P<unit>{_LENGTHS})")
-"""`92cm`."""
-_WORD_FIRST = re.compile(rf"([a-z]+)\s+(?:by\s+)?((?:{_NUMBER})\s*(?:{_UNIT}))")
-"""`long by 5cm`."""
+_BARE_TERM = re.compile(rf"(?P<value>{_NUMBER})\s*(?P<unit>{_LENGTHS})")  # `92cm`
 _SYNONYMS = {"far": "long", "beyond": "long", "above": "high", "below": "low"}
 _FROM_BASE = re.compile(r"(?P<length>.*?)\s*(?:away )?from (?:the )?(?:base|robot|arm|foot)\b.*")
-_PLACE_TERM = re.compile(rf"(?P<number>[+-]?(?:{_NUMBER}))\s*(?P<unit>{_UNIT})(?:\s*[,;]\s*|\s+|$)")
+_WITH_COMMA = re.compile(r"[+-]?\d+(?:[.,]\d+)?")
+_THOUSAND = re.compile(r"(?<![\d.,])[1-9]\d{0,2},\d{3}(?![\d.])")
+
+
+@lru_cache(maxsize=8)
+def _patterns(units: tuple[str, ...]) -> tuple[re.Pattern[str], ...]:
+    """Patterns of what is said of outcomes in these units, of which a task may have its own.
+
+    Of a term, `5-7 cm long`, `5 +- 0.5 cm long` or `long`; of one whose word is first, `long by
+    5cm`; and of a place, `92cm`, with what parts it from the next number.
+    """
+    own = {each for unit in units if unit != "1" for each in (unit, unit.lower())}
+    unit = "".join(  # some are none where letters follow: `2 somewhere`
+        re.escape(each) + "(?![a-z])" * (each in ("m", "in", "s", "h", *own)) + "|"
+        for each in sorted({*SPELT, *own}, key=len, reverse=True)
+    )
+    term = (
+        rf"(?:(?:(?P<least>{_NUMBER})\s*(?P<least_unit>{unit})\s*-\s*)?"
+        rf"(?P<value>{_NUMBER})\s*(?P<unit>{unit})\s*"
+        rf"(?:{_PLUS_MINUS}\s*(?P<sd>{_NUMBER})\s*(?P<sd_unit>{unit})\s*)?)?"
+        r"(?:to the )?(?P<word>[a-z]+)"
+    )
+    word_first = rf"([a-z]+)\s+(?:by\s+)?((?:{_NUMBER})\s*(?:{unit}))"
+    place = rf"(?P<number>[+-]?(?:{_NUMBER}))\s*(?P<unit>{unit})(?:\s*[,;]\s*|\s+|$)"
+    return tuple(map(re.compile, (term, word_first, place)))
+
+
+def with_points(text: str, k: int) -> str:
+    """Return a text whose decimal commas are points, and whose minuses are as typed.
+
+    A comma is decimal where letters follow its number, `1,2 cm`, or where there are as many numbers
+    as components, `0,92 0,1` of two. InvalidFeedbackError where it may part thousands: `1,500 mm`.
+    """
+    text, numbers = text.replace("\u2212", "-"), text.split()
+    if len(numbers) == k and all(map(_WITH_COMMA.fullmatch, numbers)):
+        pointed = text.replace(",", ".")
+    else:
+        pointed = _DECIMAL_COMMA.sub(".", text)
+    if pointed != text and (found := _THOUSAND.search(text)):
+        whole, decimal = found[0].replace(",", ""), found[0].replace(",", ".")
+        raise InvalidFeedbackError(
+            f"{found[0]} in {text!r} may be a thousand; write {whole}, or {decimal}"
+        )
+    return pointed
 
 
 def from_words(text: str, form: OutcomeFormat | None = None) -> Reading:
@@ -96,7 +125,7 @@ def from_words(text: str, form: OutcomeFormat | None = None) -> Reading:
         InvalidFeedbackError: Unknown words, or one direction named twice.
     """
     form = form or OutcomeFormat.metres(2)
-    parts = _parts(text)
+    parts = _parts(text, form)
     hits = {_HITS[part] for part in parts if part in _HITS}
     if len(hits) > 1:
         raise InvalidFeedbackError(f"{text!r} says hit and miss; say one of them")
@@ -265,12 +294,15 @@ def read_place(text: str, form: OutcomeFormat) -> Point:
         raise InvalidFeedbackError(f"cannot read {text!r} as one place; leave out the +-")
     k = form.outcome_dim
     expected = f"{k} finite numbers: {', '.join(form.names)}"
-    numbers = _numbers_with_units(text, form.units)
+    numbers = _numbers_with_units(text.replace("\u2212", "-"), form.units)
+    if numbers is None or len(numbers) != k:
+        text = with_points(text, k)
+        numbers = _numbers_with_units(text, form.units)
     if numbers is None:
         if k > len(WORDS) or {kind_of(unit) for unit in form.units} != {"length"}:
             raise InvalidFeedbackError(f"cannot read {text!r}; give {expected}")
         place = np.zeros(k)
-        for j, term in _terms(_parts(text), text, form, place=True).items():
+        for j, term in _terms(_parts(text, form), text, form, place=True).items():
             place[j] = term.sign * (term.size or 0.0)
         return place
     if len(numbers) != k or not all(map(math.isfinite, numbers)):
@@ -295,10 +327,10 @@ def _numbers_with_units(text: str, units: Sequence[str]) -> list[float] | None:
     bare = read_numbers(text)
     if bare is not None:
         return [number for number, _ in bare]
-    terms = list(_PLACE_TERM.finditer(text.strip()))
+    terms = list(_patterns(tuple(units))[2].finditer(text.strip()))
     if "".join(term[0] for term in terms) != text.strip():
         return None
-    stated = [term["unit"] and spelt(term["unit"]) for term in terms]
+    stated = [term["unit"] and (spelt(term["unit"]) or term["unit"]) for term in terms]
     if not any(stated[:-1]):
         stated = stated[-1:] * len(terms)
     if len(stated) != len(units):
@@ -328,11 +360,12 @@ class _Term:
     """Standard deviation, where a `+-` was said."""
 
 
-def _parts(text: str) -> list[str]:
+def _parts(text: str, form: OutcomeFormat) -> list[str]:
     """Split a text at commas, without fillers, in lower case."""
-    plainer = _DECIMAL_COMMA.sub(".", _FILLERS.sub("", text.strip().lower()))
+    plainer = with_points(_FILLERS.sub("", text.strip().lower()), 0)
     said = [part.rstrip(".! ") for part in _COMMA.split(_RANGE.sub("-", plainer))]
-    turned = [_WORD_FIRST.sub(r"\2 \1", p) if _WORD_FIRST.fullmatch(p) else p for p in said]
+    _, first, _ = _patterns(form.units)
+    turned = [first.sub(r"\2 \1", p) if first.fullmatch(p) else p for p in said]
     return [part.rstrip(".! ") for each in turned for part in _NEXT.split(each)]
 
 
@@ -343,11 +376,13 @@ def _terms(
     words = PLACE_WORDS if place else WORDS
     pairs = error_words(form, words)
     known = {word: (j, pair) for j, pair in enumerate(pairs) if pair for word in pair}
-    if form.outcome_dim == 1 and kind_of(form.units[0]) != "length":  # whatever is more of it
+    # Whatever is more of it; which sign was understood is said.
+    invented = form.outcome_dim == 1 and kind_of(form.units[0]) not in ("length", "time")
+    if form.outcome_dim == 1 and kind_of(form.units[0]) != "length":
         known |= {word: (0, pair) for pair in (*words, TIME_WORDS) for word in pair}
     terms: dict[int, _Term] = {}
     for position, part in enumerate(parts):
-        match, bare = _TERM.fullmatch(part), _BARE_TERM.fullmatch(part)
+        match, bare = _patterns(form.units)[0].fullmatch(part), _BARE_TERM.fullmatch(part)
         found = {} if match is None else match.groupdict()
         if not place and found:
             found["word"] = _SYNONYMS.get(found["word"], found["word"])
@@ -363,6 +398,9 @@ def _terms(
             twice = " and ".join(pair or form.names[j])
             raise InvalidFeedbackError(f"{text!r} names {twice} twice; give each direction once")
         terms[j] = _term(part, found, pair, form.units[j], form.outcome_dim)
+        if invented and (size := terms[j].size) is not None:
+            meant = f"{form.names[j]} {terms[j].sign * size:+g} {form.units[j]}"
+            terms[j] = replace(terms[j], said=f"{terms[j].said} ({meant})")
     return terms
 
 
@@ -390,7 +428,7 @@ def _in_unit(number: str, stated: str, unit: str, k: int, part: str) -> float:
         raise InvalidFeedbackError(
             f"{part!r} has no unit and would be {10 * value:g} mm; say m, cm or mm"
         )
-    given = spelt(stated) or ""
+    given = spelt(stated) or (unit if stated == unit.lower() else "")
     if not stated and (kind_of(unit) == "length" or k == 1):
         given = bare_unit(unit)
     scale = factor(given, unit)

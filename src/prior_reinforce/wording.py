@@ -187,6 +187,6 @@ def _centimetres(length: float) -> str:
 def _components(values: ArrayLike, form: OutcomeFormat, sign: str = "") -> str:
     # Adding 0.0 turns -0 into 0.
     return ", ".join(
-        f"{name} {round(float(value), 4) + 0.0:{sign}.4g} {unit}"
+        f"{name} {round(float(value), 4) + 0.0:{sign}.4g}" + f" {unit}" * (unit != "1")
         for name, value, unit in zip(form.names, np.asarray(values, float), form.units, strict=True)
     )

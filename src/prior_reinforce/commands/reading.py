@@ -17,6 +17,7 @@ from prior_reinforce.parsing import (
     from_words,
     read_numbers,
     read_uncertain_place,
+    with_points,
 )
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.trials import Goal
@@ -71,8 +72,8 @@ def read_seen(text: str, goal: Goal) -> Reading | Point:
     Raises:
         InvalidFeedbackError: It is neither, or another number of numbers.
     """
-    form, numbers = goal.format, read_numbers(text)
-    k = form.outcome_dim
+    form, k = goal.format, goal.format.outcome_dim
+    numbers = read_numbers(with_points(text, k))
     if numbers is None or (k > 1 and text == "0"):  # a lone 0 says: on the goal
         return from_words(text, form)
     if len(numbers) != k:
@@ -97,8 +98,8 @@ def read_landed(text: str, goal: Goal) -> Reading:
     Raises:
         InvalidFeedbackError: It is no place.
     """
-    form, numbers = goal.format, read_numbers(text)
-    k = form.outcome_dim
+    form, k = goal.format, goal.format.outcome_dim
+    numbers = read_numbers(with_points(text, k))
     if numbers is not None and len(numbers) != k:
         raise InvalidFeedbackError(
             f"--outcome needs {k} numbers, got {len(numbers)}: {', '.join(form.names)}"

@@ -120,7 +120,9 @@ def test_episodes_are_matched_by_their_number(recording, tmp_path):
 
 def test_numbers_that_two_names_share_match_nothing(recording, tmp_path):
     named = {f"a{name}": values for name, values in OUTCOMES.items()} | {"b3": (2.0, 2.0)}
-    with pytest.raises(InvalidDemonstrationsError, match="names episodes a3, b3 that were not found"):
+    with pytest.raises(
+        InvalidDemonstrationsError, match="names episodes a3, b3 that were not found"
+    ):
         import_demonstrations(recording, outcomes=write_outcomes(tmp_path, named))
 
 
