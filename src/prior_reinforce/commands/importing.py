@@ -24,11 +24,11 @@ from prior_reinforce.arm.recordings.outcomes import (
     Outcomes,
     in_units,
     missing_outcomes,
-    outcomes_of,
     table_beside,
     write_outcome_table,
 )
 from prior_reinforce.arm.recordings.selection import Selection
+from prior_reinforce.arm.recordings.starts import check_outcomes
 from prior_reinforce.arm.recordings.units import Ambiguity, raise_if_ambiguous
 from prior_reinforce.arm.workspace.manifest import UNKNOWN, Manifest
 from prior_reinforce.arm.workspace.view import InspectView
@@ -149,7 +149,7 @@ class Import(OnWorkspace):
                 selection = selection.without(missing_outcomes(selection.episodes, answers))
                 if not selection.recordings:
                     raise InvalidDemonstrationsError("no episode is left; import again")
-        outcomes_of(selection.episodes, known)  # before the work of the next line
+        check_outcomes(selection, known)  # before the work of the next line
         inspection = self._inspected(workspace, selection)
         result = recordings.demonstrations(inspection, known, form, declared=manifest.declared)
         print_checked(result.preview.text)

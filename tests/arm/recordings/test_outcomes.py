@@ -5,6 +5,7 @@ import pytest
 
 from prior_reinforce.arm.recordings import import_demonstrations
 from prior_reinforce.arm.recordings.outcomes import (
+    digits_at_end,
     missing_outcomes,
     read_outcomes,
     write_outcome_table,
@@ -120,9 +121,7 @@ def test_episodes_are_matched_by_their_number(recording, tmp_path):
 
 def test_numbers_that_two_names_share_match_nothing(recording, tmp_path):
     named = {f"a{name}": values for name, values in OUTCOMES.items()} | {"b3": (2.0, 2.0)}
-    with pytest.raises(
-        InvalidDemonstrationsError, match="names episodes a3, b3 that were not found"
-    ):
+    with pytest.raises(InvalidDemonstrationsError, match="no outcome for episodes 3 in"):
         import_demonstrations(recording, outcomes=write_outcomes(tmp_path, named))
 
 
@@ -402,7 +401,7 @@ def test_what_is_written_otherwise_is_told_with_what_to_write(recording, tmp_pat
         read_outcomes(table(tmp_path, text), ["x", "y"])
 
 
-def rows(scale=(1, 1), first=0, name="{}"):
+def rows_of_outcomes(scale=(1, 1), first=0, name="{}"):
     """Lines of the throws' outcomes, in other units or numbered from another number."""
     return [
         f"{name.format(int(episode) + first)},{scale[0] * x:.6g},{scale[1] * y:.6g}"
@@ -413,7 +412,7 @@ def rows(scale=(1, 1), first=0, name="{}"):
 @pytest.mark.parametrize("unit", ["mm", "cm"])
 def test_lengths_of_one_table_have_one_unit(recording, tmp_path, unit):
     scale = 1 / base_of(unit)[1]
-    path = table(tmp_path, "\n".join(["episode,x,y", *rows((scale, scale))]))
+    path = table(tmp_path, "\n".join(["episode,x,y", *rows_of_outcomes((scale, scale))]))
     with pytest.raises(UnclearUnitsError, match=f"like {unit}") as asked:
         import_demonstrations(recording, outcomes=path)
     assert asked.value.options == f"--outcome-unit {unit}"
@@ -423,12 +422,12 @@ def test_lengths_of_one_table_have_one_unit(recording, tmp_path, unit):
 
 @pytest.mark.parametrize("scale", [(1, 100), (100, 1), (1, 1000)])
 def test_lengths_in_two_units_have_to_be_said_each(recording, tmp_path, scale):
-    path = table(tmp_path, "\n".join(["episode,x,y", *rows(scale)]))
+    path = table(tmp_path, "\n".join(["episode,x,y", *rows_of_outcomes(scale)]))
     with pytest.raises(InvalidDemonstrationsError, match=r"several units: .* in the head"):
         import_demonstrations(recording, outcomes=path)
     units = [{1: "m", 100: "cm", 1000: "mm"}[each] for each in scale]
     head = f"episode,x [{units[0]}],y [{units[1]}]"
-    path = table(tmp_path, "\n".join([head, *rows(scale)]))
+    path = table(tmp_path, "\n".join([head, *rows_of_outcomes(scale)]))
     seen = import_demonstrations(recording, outcomes=path).demonstrations.outcomes_seen
     np.testing.assert_allclose(seen, list(OUTCOMES.values()))
 
@@ -437,16 +436,16 @@ def test_lengths_in_two_units_have_to_be_said_each(recording, tmp_path, scale):
 def test_rows_that_are_numbered_otherwise_are_not_taken_for_their_neighbours(
     recording, tmp_path, options
 ):
-    path = table(tmp_path, "\n".join(["episode,x,y", *rows(first=1)]))
+    path = table(tmp_path, "\n".join(["episode,x,y", *rows_of_outcomes(first=1)]))
     with pytest.raises(InvalidDemonstrationsError, match=r"begins with 1, and they with 0: renumb"):
         import_demonstrations(recording, outcomes=path, **options)
-    path = table(tmp_path, "\n".join(["episode,x,y", *rows(first=1)[:5]]))
+    path = table(tmp_path, "\n".join(["episode,x,y", *rows_of_outcomes(first=1)[:5]]))
     with pytest.raises(InvalidDemonstrationsError, match=r"begins with 1, and they with 0: renumb"):
         import_demonstrations(recording, outcomes=path)
 
 
 def test_some_episodes_may_be_asked_for_with_a_table_of_more(recording, tmp_path):
-    path = table(tmp_path, "\n".join(["episode,x,y", *rows(), "17,1,0"]))
+    path = table(tmp_path, "\n".join(["episode,x,y", *rows_of_outcomes(), "17,1,0"]))
     assert import_demonstrations(recording, outcomes=path, episodes=["0", "3"]).episodes == (
         "0",
         "3",
@@ -470,12 +469,41 @@ def test_columns_may_be_called_by_where_they_count_up_to(recording, tmp_path, he
 
 
 def test_a_printed_minus_is_read(recording, tmp_path):
-    text = "\n".join(["episode,x,y", *rows()])
+    text = "\n".join(["episode,x,y", *rows_of_outcomes()])
     seen = import_demonstrations(recording, outcomes=table(tmp_path, text.replace("-", "\u2212")))
     np.testing.assert_allclose(seen.demonstrations.outcomes_seen, list(OUTCOMES.values()))
 
 
 def test_a_cell_with_a_word_is_to_be_written_as_a_number(recording, tmp_path):
-    path = table(tmp_path, "\n".join(["episode,x,y", *rows()[:-1], "5,1.05,0.05 left"]))
+    path = table(tmp_path, "\n".join(["episode,x,y", *rows_of_outcomes()[:-1], "5,1.05,0.05 left"]))
     with pytest.raises(FileFormatError, match=r"'0.05 left'.* plain number"):
         import_demonstrations(recording, outcomes=path)
+
+
+def test_ways_home_beside_the_throws_are_left_out_by_name(tmp_path):
+    """`throw_3` and `home_3` share a number: the row 3 is of the one that is not left out."""
+    folder = write_csv(tmp_path)
+    for i in range(6):
+        text = (folder / f"{i}.csv").read_text().splitlines()
+        (folder / f"{i}.csv").unlink()
+        (folder / f"throw_{i}.csv").write_text("\n".join(text))
+        times, rows = zip(*(line.split(",", 1) for line in text[1:]), strict=True)
+        back = [text[0], *(f"{t},{row}" for t, row in zip(times, rows[::-1], strict=True))]
+        (folder / f"home_{i}.csv").write_text("\n".join(back))
+    path = table(tmp_path, "\n".join(["episode,x,y", *rows_of_outcomes()]))
+    homes = [f"home_{i}" for i in range(6)]
+    seen = import_demonstrations(folder, outcomes=path, leave_out=homes).demonstrations
+    np.testing.assert_allclose(seen.outcomes_seen, list(OUTCOMES.values()))
+
+
+def test_the_seconds_of_a_time_are_no_number_of_an_episode():
+    assert digits_at_end("2024-05-03_14-02-03") == digits_at_end("20240503T140203") == ""
+    assert digits_at_end("demo_003") == digits_at_end("set-2_3") == "3"
+    assert digits_at_end("2024-05-03") == digits_at_end("log_2024-05-03_1402") == ""
+    assert digits_at_end("2024-05-03_demo_003") == digits_at_end("2024-05-03_3") == "3"
+
+
+def test_a_distance_and_a_bearing_are_said_to_be_no_x_and_y(recording, tmp_path):
+    path = table(tmp_path, "episode,r,angle\n0,0.9,7\n")
+    with pytest.raises(InvalidDemonstrationsError, match="x = r cos b"):
+        import_demonstrations(recording, outcomes=path, outcome_names=("x", "y"))

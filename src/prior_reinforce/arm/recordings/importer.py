@@ -11,11 +11,8 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from prior_reinforce.arm.recordings import csv, hdf5, lerobot, npz, ros, zarr
 from prior_reinforce.arm.recordings.bounds import check_numbers
@@ -36,6 +33,7 @@ from prior_reinforce.arm.recordings.preprocessing import Preprocessing, at_rests
 from prior_reinforce.arm.recordings.preview import Preview
 from prior_reinforce.arm.recordings.recording import Episodes, Recording, has_files, refuse_pointers
 from prior_reinforce.arm.recordings.selection import Selection, select
+from prior_reinforce.arm.recordings.starts import check_outcomes, ways_back
 from prior_reinforce.arm.recordings.units import Ambiguity, listed, raise_if_ambiguous
 from prior_reinforce.arm.robots import GateSettings, RobotLimits
 from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidDemonstrationsError
@@ -49,8 +47,6 @@ from prior_reinforce.wording import as_html
 _REST, _MOST_MOTIONS = 0.5, 3
 """Rest in [s] after which another throw may begin, and motions of one throw: there and back, with a
 pause. Ours."""
-_BACK = 0.1
-"""Part of its range that a joint may be off where a motion goes back to another's start (ours)."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +153,7 @@ def import_demonstrations(
         known, unclear = in_units(known, outcome_units, outcome_unit)
         ambiguities += unclear
     raise_if_ambiguous(ambiguities, take_guesses=take_guesses)
-    outcomes_of(selection.episodes, known)  # before the work of the next line
+    check_outcomes(selection, known)  # before the work of the next line
     inspection = inspect(selection, preprocessing, robot, gate, before)
     names = outcome_names if outcome_names is not None or not known.named else known.names
     units = tuple(outcome_units or [unit or "m" for unit in known.units])
@@ -210,13 +206,6 @@ def read_recordings(
     recordings = read(source, ReadOptions(**options))
     raise_if_ambiguous(() if take_guesses else recordings.ambiguities)
     return list(recordings.episodes)
-
-
-def _goes_back(before: Recording, motion: Recording) -> bool:
-    """Whether a motion ends where the one before it began."""
-    both = np.vstack([before.positions, motion.positions])
-    far = np.abs(motion.positions[-1] - before.positions[0])
-    return bool(np.all(far <= _BACK * np.maximum(np.ptp(both, axis=0), 1e-12)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -330,7 +319,7 @@ class Recordings:
         motions = [recording.episode for recording in self.episodes]
         if not self.options.rests or not {*motions}.isdisjoint(found.episodes):
             if self.options.episodes is None:  # else the table may be of other sources, too
-                check_rows(found, self.there)
+                check_rows(found, motions, self.there)
             return found
         if len(motions) == len(found.episodes):
             numbers = [digits_at_end(name) for name in found.episodes]
@@ -338,17 +327,11 @@ class Recordings:
                 order = sorted(map(int, numbers))
                 motions = [motions[order.index(int(number))] for number in numbers]
             return replace(found, episodes=tuple(motions))
-        back: list[str] = []
-        for before, motion in pairwise(self.episodes):
-            if before.episode not in back and _goes_back(before, motion):
-                back.append(motion.episode)
         remedy = "leave out those without one (--leave-out), or cut at other rests (--rests)"
-        if back:
-            remedy = f"{listed(back)} go back to where the motion before began: if those are no "
-            remedy += f"throws, --leave-out {' '.join(back)}"
         raise InvalidDemonstrationsError(
             f"{self.source} was cut into {len(motions)} motions, and {found.where} has "
-            f"{len(found.episodes)} outcomes: name each outcome's motion ({motions[0]}); {remedy}"
+            f"{len(found.episodes)} outcomes: name each outcome's motion ({motions[0]}); "
+            f"{ways_back(self.episodes) or remedy}"
         )
 
     def demonstrations(

@@ -19,6 +19,7 @@ from prior_reinforce.arm.recordings.preprocessing import (
 )
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.selection import Selection
+from prior_reinforce.arm.recordings.starts import odd_starts
 from prior_reinforce.arm.recordings.turns import aligned
 from prior_reinforce.arm.recordings.units import Ambiguity, say_names
 from prior_reinforce.arm.robots import GateSettings, RobotLimits, check_plan
@@ -35,6 +36,9 @@ _SMOOTH_HZ = 20
 _SMOOTH = f"--smooth {_SMOOTH_HZ}"
 """Removes an encoder's noise; a throw has nothing above 20 Hz. Ours."""
 
+_RETURNED = 0.05
+"""Part of its range by which each channel of a motion that returns may end beside its start (ours).
+"""
 _WORST = 2.5
 """Standard deviations that the worst of a plan's frames is off by. Ours: measured, 30 plans of 88
 frames, 2.3 to 2.9; what an end leaps by from rest is 1.3 to 2.4."""
@@ -90,7 +94,13 @@ class Inspection:
     def remarks(self) -> tuple[str, ...]:
         """Warnings, the most important first: limits, ends, gaps, ..."""
         left_out = self.selection.left_out
-        first = (self.copies, *self.selection.remarks, *self._broken(), self._noise_warning())
+        first = (
+            self.copies,
+            self._returns(),
+            *self.selection.remarks,
+            *self._broken(),
+            self._noise_warning(),
+        )
         last = f"left out although it moves: {left_out} ({_TAKE_IT})" if left_out else ""
         return tuple(filter(None, (*first, last, *self.processed.remarks)))
 
@@ -198,6 +208,17 @@ class Inspection:
             found.append(f"with {_SMOOTH} fewer demonstrations break a limit")
         return found
 
+    def _returns(self) -> str:
+        """That every motion ends where it began, if so: it may hold a way back."""
+        plans = self.processed.plans
+        near = _RETURNED * np.ptp(plans, axis=1)
+        if np.any(np.abs(plans[:, -1] - plans[:, 0]) > near):
+            return ""
+        return (
+            "every motion ends where it began: if that is the way back, cut it off at the rest "
+            "before it (--rests 0.3), and leave it out"
+        )
+
     def _noise(self) -> str:
         names, units, done = self.selection.names, self.selection.units, self.processed
         noisiest = int(np.argmax(done.noise))
@@ -296,6 +317,9 @@ def inspect(
     selection, form = aligned(selection, robot, before)
     processed = preprocess(selection.recordings, selection.units, settings)
     form = replace(form, dt=processed.dt)
+    shown = () if before is None else before.plans
+    odd = odd_starts([*shown], [*processed.plans], selection.episodes, form.names, form.units)
+    selection = replace(selection, remarks=(*selection.remarks, *odd))
     reports: tuple[LimitReport, ...] = ()
     if robot is not None:
         with suppress(InvalidPlanError):

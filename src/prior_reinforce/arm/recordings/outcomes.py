@@ -45,11 +45,17 @@ _HUNDREDS = re.compile(r"[+-]?[1-9]\d\d+")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}([.,]\d{3})+")
 _WITH_UNIT = re.compile(r"([-+\d.,]+) *([^\d\s.,]+)")
 """A number and its unit in one cell."""
+_DATED = re.compile(
+    r"(19|20)\d\d([-_.]?)[01]\d\2[0-3]\d([T_ .-]?[0-2]\d[-_.:h]?[0-5]\d([-_.:m]?[0-5]\d.*)?)?$"
+)
+"""A date, or one with its time of day, at the end of a name."""
 _UNCERTAINTY = re.compile(r"(.*[^a-z])?(sd|std|stdev|sigma|stderr|uncertainty)([^a-z].*)?|.*±.*")
 _SEMICOLONS = "semicolons, where a comma is the decimal sign"
 _FAR, _FEW = 10.0, 3
 """Times as far as all others that an outcome is in another unit, and outcomes of which it is not
 yet known how far they lie apart. Ours."""
+_RADII = ("r", "radius", "distance", "dist", "range")
+_BEARINGS = ("angle", "bearing", "azimuth", "theta", "phi", "heading", "direction")
 _NEAR_THE_BASE = 0.05
 """So near the base along a component, in [m], hardly any table of outcomes stays. Ours: a throw
 straight ahead scatters as much to the side; then the units are to be said in the head."""
@@ -102,9 +108,13 @@ class Outcomes:
             said += [f"{own} is {'-' * (sign < 0)}{name}"] * (own != name)
             at, signs = [*at, self.names.index(own)], [*signs, float(sign)]
         if missing:
+            polar = ""
+            if {*_RADII}.intersection(self.names) and {*_BEARINGS}.intersection(self.names):
+                polar = "; of a distance r and a bearing b to the left, x = r cos b and y = r sin b"
             raise InvalidDemonstrationsError(
                 f"{self.where} has no column {', '.join(missing)}; it has "
-                f"{', '.join(self.names)}: rename or add it (x is ahead of the base, y to its left)"
+                f"{', '.join(self.names)}: rename or add it (x is ahead of the base, y to its left"
+                f"{polar})"
             )
         where = f"{self.where} ({', '.join(said)})" if said else self.where
         units = tuple(self.units[i] for i in at)
@@ -255,7 +265,7 @@ def _finite(path: Path, table: Table, row: int, column: int) -> float:
         name, cell = table.names[column], table.cells[column][row][:40]
         remedy = "measure that outcome, or empty the whole row's numbers"
         if re.search(r"\d", cell):
-            remedy = "write a plain number there (y counts to the left)"
+            remedy = "write a plain number there"
         if (said := _WITH_UNIT.fullmatch(cell)) and (unit := known_unit(said[2])):
             remedy = f"write {said[1]}, and the unit in the head: {name} [{unit}]"
         raise FileFormatError(
@@ -324,7 +334,7 @@ def in_units(
             unclear.setdefault(recorded, []).append(f"{name} reaches {largest:.4g}")
         elif own is not None and given != unit and looks != unit:
             unclear.setdefault(unit, []).append(f"{name} reaches {most:.4g} {unit} ({rename})")
-    _refuse_one_unit(outcomes, wanted, unclear)
+    _refuse_one_unit(outcomes, wanted, [*unclear])
     inches = " (or inches: --outcome-unit in)"
     ambiguities = tuple(
         Ambiguity(
@@ -402,27 +412,28 @@ def missing_outcomes(episodes: Sequence[str], outcomes: Outcomes) -> list[str]:
     return [episode for episode in episodes if episode not in picked]
 
 
-def check_rows(outcomes: Outcomes, there: Sequence[str]) -> None:
-    """Check that every row is of one of the source's episodes, all of which are `there`.
+def check_rows(outcomes: Outcomes, chosen: Sequence[str], there: Sequence[str]) -> None:
+    """Check that every row is of one of the `chosen` episodes, or of another that is `there`.
 
     Raises:
         InvalidDemonstrationsError: A row is of none; so is the last if the rows are numbered from 1
             and the episodes from 0.
     """
-    picked = _matched(there, outcomes.episodes)
-    unknown = [name for name in outcomes.episodes if name not in picked.values()]
+    rows, picked = outcomes.episodes, _matched(chosen, outcomes.episodes).values()
+    known = {*there, *picked} | {digits_at_end(name) for name in there} - {""}
+    unknown = [name for name in rows if name not in known and digits_at_end(name) not in known]
     if unknown:
         raise InvalidDemonstrationsError(
             f"{outcomes.where} names episodes {listed(unknown)} that were not found (there are "
-            f"{listed(there)}); {_renumber(there, outcomes.episodes)}correct the names, or take "
-            "out the rows of what was not recorded"
+            f"{listed(there)}); {_renumber(there, rows)}correct the names, or take out the rows of "
+            "what was not recorded"
         )
 
 
 def _renumber(episodes: Sequence[str], rows: Sequence[str]) -> str:
     """What to do where rows may be numbered from another number than the episodes; else empty."""
     ours, theirs = ([digits_at_end(name) for name in names] for names in (episodes, rows))
-    if not (all(ours) and all(theirs) and ours and theirs):
+    if not (all(ours) and all(theirs) and ours and theirs) or len({*ours}) < len(ours):
         return ""
     first, of_table = min(map(int, ours)), min(map(int, theirs))
     if first == of_table or len(theirs) > len(ours):
@@ -470,6 +481,9 @@ def _matched(episodes: Sequence[str], names: Sequence[str]) -> dict[str, str]:
 
 
 def digits_at_end(name: str) -> str:
-    """Return the number at the end of a name, without leading zeros; empty if there is none."""
+    """Return the number at the end of a name, without leading zeros; empty if there is none.
+
+    The last digits of a time, `2024-05-03_14-02-03`, are no number of an episode.
+    """
     match = re.search(r"0*([0-9]+)$", name)
-    return match[1] if match else ""
+    return match[1] if match and not _DATED.search(name) else ""

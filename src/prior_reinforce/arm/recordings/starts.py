@@ -1,0 +1,99 @@
+"""Takes that are no throw like the others: they start elsewhere, go another way, or go back."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Float
+
+from prior_reinforce.arm.recordings.outcomes import Outcomes, missing_outcomes, outcomes_of
+from prior_reinforce.arm.recordings.recording import Recording
+from prior_reinforce.arm.recordings.selection import Selection
+from prior_reinforce.arm.recordings.units import listed
+from prior_reinforce.errors import InvalidDemonstrationsError
+
+_APART, _AGAINST = 2.0, 0.5
+"""Ranges of its motion by which a channel's starts in two groups of takes may lie apart, and that
+where the groups move in opposite directions. Ours: a zero that was moved, columns in another order,
+a gripper that counts the other way."""
+_WITHIN = 0.2
+"""Part of the gap between two groups by which starts within one may differ. Ours."""
+_BACK = 0.1
+"""Part of its range that a joint may be off where a motion goes back to another's start (ours)."""
+
+
+def odd_starts(
+    before: Sequence[Float[np.ndarray, "T D"]],
+    motions: Sequence[Float[np.ndarray, "T D"]],
+    episodes: Sequence[str],
+    names: Sequence[str],
+    units: Sequence[str],
+) -> Iterator[str]:
+    """Say which takes start far from the others in a channel, as if they were of another arm.
+
+    Demonstrations that were there `before` count as one group.
+    """
+    motions, n = [*before, *motions], len(before)
+    episodes = [*(f"demonstration {i} so far" for i in range(n)), *episodes]
+    if len(motions) < 2:
+        return
+    starts = np.array([motion[0] for motion in motions])
+    ways = np.array([motion[-1] for motion in motions]) - starts
+    ranges = np.median([np.ptp(motion, axis=0) for motion in motions], axis=0)
+    for i, (name, unit) in enumerate(zip(names, units, strict=True)):
+        order = np.argsort(starts[:, i])
+        gaps = np.diff(starts[order, i])
+        cut = int(np.argmax(gaps)) + 1
+        below, above = order[:cut], order[cut:]
+        spread = max(np.ptp(starts[group, i]) for group in (below, above))
+        against = np.median(ways[below, i]) * np.median(ways[above, i]) < 0
+        allowed = (_AGAINST if against else _APART) * ranges[i]
+        if ranges[i] > 0 and gaps[cut - 1] > allowed and spread <= _WITHIN * gaps[cut - 1]:
+            few, rest = sorted((below, above), key=lambda group: (len(group), max(group)))
+            if {*rest.tolist()} != {*range(n)} and {*few.tolist()} == {*range(n)}:
+                few, rest = rest, few
+            here, there = (f"{np.median(starts[group, i]):.3g} {unit}" for group in (few, rest))
+            yield (
+                f"{name} starts at {here} in {listed([episodes[k] for k in sorted(few)])}, and at "
+                f"{there} in the others{', and goes the other way' * bool(against)}: if that is "
+                "not meant, its zero, its sign or the order of columns is another"
+            )
+
+
+def ways_back(recordings: Sequence[Recording]) -> str:
+    """Say what to do with motions that go back to where the one before began; empty if none do."""
+    back = list[str]()
+    for before, motion in pairwise(recordings):
+        alike = before.positions.shape[1] == motion.positions.shape[1]
+        if alike and before.episode not in back and _goes_back(before, motion):
+            back.append(motion.episode)
+    if not back:
+        return ""
+    said = f"{listed(back)} go back to where the motion before began: if those are no throws, "
+    return f"{said}--leave-out {shlex.join(back)}"
+
+
+def _goes_back(before: Recording, motion: Recording) -> bool:
+    """Whether a motion goes from where the one before it ended to where that began."""
+    near = _BACK * np.ptp(np.vstack([before.positions, motion.positions]), axis=0)
+    (began, ended), (begins, ends) = (each.positions[[0, -1]] for each in (before, motion))
+    there = np.all(np.abs([ends - began, begins - ended]) <= np.maximum(near, 1e-12))
+    return bool(there and np.any(np.abs(ends - begins) > near))
+
+
+def check_outcomes(selection: Selection, outcomes: Outcomes) -> None:
+    """Check that each episode has an outcome.
+
+    Raises:
+        InvalidDemonstrationsError: As in `outcomes_of`; ways back among them are named.
+    """
+    try:
+        outcomes_of(selection.episodes, outcomes)
+    except InvalidDemonstrationsError as error:
+        back = ways_back(selection.recordings)
+        if back and missing_outcomes(selection.episodes, outcomes):
+            raise InvalidDemonstrationsError(f"{error}; {back}") from error
+        raise
