@@ -83,7 +83,11 @@ UNITS: Mapping[str, Unit] = {
     ),
     "share": Unit(kind="share", factor=1.0, plural="shares", spellings="fraction"),
     "rev": Unit(
-        kind="angle", factor=2 * math.pi, plural="revolutions", spellings="revs revolution"
+        kind="angle", factor=2 * math.pi, plural="revolutions",
+        spellings="revs revolution turn turns",
+    ),
+    "mrad": Unit(
+        kind="angle", factor=1e-3, plural="milliradians", spellings="milliradian"
     ),
 }  # fmt: skip
 SPELT = {

@@ -54,6 +54,11 @@ def joined(before, more, robot=None):
     return appended(before, new, more.episodes), found
 
 
+def alignments(found):
+    """What was done to the new ones, without what is only said of their starts."""
+    return [said for said in found.selection.remarks if " starts at " not in said]
+
+
 def quaternion(i):
     half = (1.3 + (0.2 + 0.03 * i) * S[:, None]) / 2
     return np.hstack([np.sin(half) * [0.6, 0.64, 0.48], np.cos(half)])
@@ -88,13 +93,14 @@ def test_new_ones_are_aligned_with_those_in_use(names, unit, motion, otherwise, 
     limits = None if robot is None else robot_limits(robot)
     before = demonstrations(names, unit, motion)
     both, found = joined(before, selection(names, unit, lambda i: otherwise(motion(i))), limits)
-    assert found.selection.remarks
-    assert all(said.startswith("new 3, new 4, new 5: ") for said in found.selection.remarks)
+    remarks = alignments(found)
+    assert remarks
+    assert all(said.startswith("new 3, new 4, new 5: ") for said in remarks)
     np.testing.assert_array_equal(both.plans[:N], before.plans)
     np.testing.assert_allclose(both.plans, [motion(i) for i in range(2 * N)], atol=1e-12)
     if robot is not None:  # the gate sees them as they are taken in
         assert not any(report.refused for report in found.reports)
-    assert not joined(before, selection(names, unit, motion), limits)[1].selection.remarks
+    assert not alignments(joined(before, selection(names, unit, motion), limits)[1])
 
 
 def gap(i, low, high, scale=1.0):

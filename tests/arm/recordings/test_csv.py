@@ -499,3 +499,36 @@ def test_a_json_of_another_table_names_no_columns(tmp_path):
     (tmp_path / "throw_1.json").write_text(json.dumps({"columns": JOINTS[::-1]}))
     zero, one = read_recordings(tmp_path, rate=100, joints=JOINTS)
     assert (zero.named, one.named) == (False, True)
+
+
+def test_a_head_that_comes_again_parts_throws_and_is_no_row(tmp_path):
+    lines = []
+    for i in range(3):
+        t, q = sampled(i, 50)
+        rows = ",".join(("t", *JOINTS)), *(",".join(map(repr, r)) for r in np.c_[t, q].tolist())
+        lines += rows
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    read = read_recordings(tmp_path / "log.csv")
+    assert [r.episode for r in read] == ["log-0", "log-1", "log-2"]
+    np.testing.assert_allclose(read[1].positions, sampled(1, 50)[1])
+
+
+def test_a_line_of_means_below_is_named_and_not_a_missing_time(tmp_path):
+    t, q = sampled(0, 50)
+    rows = [",".join(map(repr, r)) for r in np.c_[t, q].tolist()]
+    text = "\n".join([",".join(("Zeit [s]", *JOINTS)), *rows, "Mittelwert,0,0,0,0,0,0,0"])
+    (tmp_path / "log.csv").write_text(text)
+    with pytest.raises(FileFormatError, match=rf"line {len(t) + 2}: Zeit .* is 'Mittelwert'.* take"):
+        read_recordings(tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize("name", ["frame", "Sample", "step_index"])
+def test_a_counter_is_asked_for_its_rate_and_is_no_clock_in_ms(tmp_path, name):
+    t, q = sampled(0, 500)
+    rows = [",".join(map(repr, r)) for r in np.c_[np.arange(len(t)), q].tolist()]
+    (tmp_path / "log.csv").write_text("\n".join([",".join((name, *JOINTS)), *rows]))
+    with pytest.raises(UnclearUnitsError, match="counts frames") as asked:
+        read_recordings(tmp_path / "log.csv")
+    assert "--time-unit frame --rate HZ" in asked.value.options
+    (read,) = read_recordings(tmp_path / "log.csv", time_column=name, time_unit="frame", rate=500)
+    np.testing.assert_allclose(read.times, t)

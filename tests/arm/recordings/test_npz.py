@@ -219,3 +219,25 @@ def test_a_gripper_at_a_rate_of_its_own_is_named_and_what_to_do_about_it(tmp_pat
         FileFormatError, match=r"gripper has \d+; .* at the times of q: numpy\.interp"
     ):
         read_recordings(tmp_path / "a.npz", key=["q", "gripper"])
+
+
+def test_fields_of_a_record_are_arrays_of_their_own_in_any_order(tmp_path):
+    for i in range(2):
+        t, q = sampled(i, 50)
+        names = ("time", *(JOINTS if i else JOINTS[::-1]))
+        log = np.zeros(len(t), dtype=[(name, "f8") for name in names])
+        log["time"] = t
+        for k, joint in enumerate(JOINTS):
+            log[joint] = q[:, k]
+        np.savez(tmp_path / f"{i}.npz", log=log)
+    for i, read in enumerate(read_recordings(tmp_path, joints=JOINTS)):
+        np.testing.assert_allclose(read.positions, sampled(i, 50)[1])
+        np.testing.assert_allclose(read.times, sampled(i, 50)[0])
+
+
+def test_three_numbers_of_a_place_are_called_by_their_key(tmp_path):
+    t, q = sampled(0, 50)
+    place, quaternion = 1000 * q[:, :3], np.c_[np.zeros((len(t), 3)), np.ones(len(t))]
+    np.savez(tmp_path / "a.npz", t=t, eef_pos=place, quat=quaternion)
+    (read,) = read_recordings(tmp_path / "a.npz", key=("eef_pos", "quat"))
+    assert read.names[:4] == ("eef_pos_x", "eef_pos_y", "eef_pos_z", "quat_0")

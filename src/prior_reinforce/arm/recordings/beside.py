@@ -17,6 +17,7 @@ import numpy as np
 
 from prior_reinforce.arm.recordings.bounds import check_names
 from prior_reinforce.arm.recordings.clock import (
+    COUNTER,
     NO_COLUMN,
     SAME_RATE,
     Clock,
@@ -63,13 +64,18 @@ _ELSE = re.compile(
     re.IGNORECASE,
 )
 """Names of what moves and is no part of an arm: outcomes and whole states of a simulator."""
-_COUNTER = re.compile(r"(^|[^a-z])(seq|frame|index|idx|count|counter|tick|row|nr|step)s?($|[^a-z])")
 _FRAMES = re.compile(
     r"lengths?|(n|num)_?(frames|steps|samples)|(episode|traj|trajectory|sequence)_(len|lengths?)"
 )
 _MASK = re.compile(
     r"((is|frame|attention|episode)_)?(pad|padded|padding|valid|masks?|(pad|padding|valid)_mask)"
 )
+_PLACE_KEY = re.compile(
+    r"(.*[^a-z])?(eef?|tcp|tool|tip|hand|flange|cart(esian)?|end_?effector)([^a-z].*)?"
+    r"|p|pos|positions?|xyz|trans(lation)?|place",
+    re.IGNORECASE,
+)
+"""What three numbers are called that are a place."""
 _UNIT = re.compile(r"((joint|angle|angular|position|motion|rotation)s?_?)?units?", re.IGNORECASE)
 """What the joints' units are called among others, deep in what a file says of itself."""
 _MOST_SAID = 1_000_000
@@ -171,7 +177,10 @@ def joined(
     said = list(names_said(where, texts, sum(widths), joints))
     if len(keys) > 1 and not said:
         said = list(names_said(where, texts, widths[0], joints)) if widths[0] > 1 else [keys[0]]
-        said = said or [f"joint{i + 1}" for i in range(widths[0])]
+        place = widths[0] == 3 and _PLACE_KEY.fullmatch(keys[0].rpartition("/")[2])
+        said = said or [
+            f"{keys[0]}_{'xyz'[i]}" if place else f"joint{i + 1}" for i in range(widths[0])
+        ]
         for key, width in zip(keys[1:], widths[1:], strict=True):
             said += [key if width == 1 else f"{key}_{i}" for i in range(width)]
     return np.concatenate(columns, axis=1).astype(np.float64), tuple(said)
@@ -386,7 +395,7 @@ def is_clock(name: str, values: Times, times: Times) -> bool:
     if len(steps) < 2 or not np.all(steps > 0) or seconds <= 0:
         return False
     whole = bool(np.all(values % 1 == 0))
-    if says_time(name) or (whole and (np.median(steps) == 1 or _COUNTER.search(name.lower()))):
+    if says_time(name) or (whole and (np.median(steps) == 1 or COUNTER.search(name.lower()))):
         return True
     rates = [(values[-1] - values[0]) * scale / seconds for scale in SECONDS.values()]
     line = values[0] + (values[-1] - values[0]) * (times - times[0]) / seconds

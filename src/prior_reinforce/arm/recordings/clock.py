@@ -52,6 +52,10 @@ _LOWEST_RATE, _HIGHEST_RATE = 1e-3, 1e6
 """Declared frames a second beyond which a file is damaged. Ours."""
 _SLOWEST, _FASTEST = 1.0, 1e4
 """And beyond which a rate or a unit is doubted although the file or a person says it. Ours."""
+COUNTER = re.compile(
+    r"(^|[^a-z])(seq|frame|sample|index|idx|count|counter|tick|row|nr|step)s?($|[^a-z])"
+)
+"""Names of columns that count frames."""
 _RATE = re.compile(
     r"((control|sampl[a-z]*|frame|record[a-z]*)[ _]?)?(fps|fs|hz|rate|freq(uency)?)([ _]?hz)?"
 )
@@ -370,6 +374,9 @@ def _judge(
     if looks is None:
         return "s", (Ambiguity(f"{what}and no other unit fits better", "--time-unit s"),)
     what += f"in {looks} {rate_in(looks)}: it looks like {looks}"
+    if said is None and period == 1 and COUNTER.search(name.lower()):
+        what = f"{name} counts frames, and nothing says how many a second are"
+        return "s", (Ambiguity(what, "--time-unit frame --rate HZ", guessed=False),)
     if said is None and period == 1:
         what += " (or it counts frames: --time-unit frame --rate HZ)"
     return looks, (Ambiguity(what, f"--time-unit {looks}"),)

@@ -406,7 +406,18 @@ def _clock(
     unit: str | None,
 ) -> Clock:
     if not times.columns:
-        return options.clock(episode, len(table), **_declared(table, above, options))
+        declared = _declared(table, above, options)
+        for i, name in enumerate(table.names):  # else it would be said to hold no times
+            if not (table.named and says_time(name)) or declared or options.rate:
+                continue
+            bad = np.isnan(table.values[:, i])
+            if 0 < bad.sum() < len(bad) / 2:
+                row = int(np.argmax(bad))
+                raise FileFormatError(
+                    f"{table.where}, line {table.lines[row]}: {name} is "
+                    f"{table.cells[i][row][:40]!r}, expected a time; take that line out"
+                )
+        return options.clock(episode, len(table), **declared)
     time = times.columns[0]
     dates, name = table.nanoseconds(time), table.names[time] or f"column {time + 1}"
     unit = times.unit or unit

@@ -1,8 +1,8 @@
 """Recordings in NPZ or NPY: a file an episode, or one file whose motion has shape (N, T, D).
 
 An NPY holds the motion alone. Arrays of an NPZ: the motion (`key`, or `q`, `plans`, `positions`,
-`actions`, or one array a joint), `t` or `dt` or `rate`, and optionally names of the joints, their
-units, `lengths`, and `outcome`, `outcomes` or `outcomes_seen`.
+`actions`, or one array or field a joint), `t` or `dt` or `rate`, and optionally names of the
+joints, their units, `lengths`, and `outcome`, `outcomes` or `outcomes_seen`.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ def _arrays(path: Path) -> Arrays:
     if path.suffix.lower() == ".npy":
         check_bytes(path, path.stat().st_size)
         with named_damage(path, "NPY with plain numbers"), path.open("rb") as file:
-            return {_MOTION_KEYS[0]: np.load(file, allow_pickle=False)}
+            return _by_field({_MOTION_KEYS[0]: np.load(file, allow_pickle=False)})
     remedy = "it must be an NPZ with plain number arrays; copy it again, or say its format"
     with open_npz(path, remedy, MOST_BYTES) as archive:
         content = {name: np.asarray(archive[name]) for name in archive.files}
@@ -136,4 +136,12 @@ def _arrays(path: Path) -> Arrays:
             content.setdefault("dt", np.array(float(form["dt"])))
             content.setdefault("names", np.array(form.get("names") or form.get("joint_names")))
             del content["metadata"]
-        return content
+        return _by_field(content)
+
+
+def _by_field(arrays: Arrays) -> dict[str, np.ndarray]:
+    """Arrays with each field of a record by itself, by the field's name."""
+    fields = [(name, field) for name, own in arrays.items() for field in own.dtype.names or ()]
+    twice = len({field for _, field in fields} | arrays.keys()) < len(fields) + len(arrays)
+    plain = {name: own for name, own in arrays.items() if not own.dtype.names}
+    return plain | {f"{n}.{f}" if twice else f: arrays[n][f] for n, f in fields}

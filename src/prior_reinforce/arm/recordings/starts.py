@@ -26,8 +26,8 @@ _BACK = 0.1
 
 
 def odd_starts(
-    before: Sequence[Float[np.ndarray, "T D"]],
-    motions: Sequence[Float[np.ndarray, "T D"]],
+    before: Sequence[Float[np.ndarray, "_ D"]],
+    motions: Sequence[Float[np.ndarray, "_ D"]],
     episodes: Sequence[str],
     names: Sequence[str],
     units: Sequence[str],

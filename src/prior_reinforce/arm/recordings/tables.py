@@ -303,6 +303,7 @@ def _table(
     if named and len(rows) > 1 and _are_units(rows[0][1], decimal):
         units, rows = [known_unit(c) for c in rows[0][1]], rows[1:]
     check_names(where, names)
+    rows = [(i, row) for i, row in rows if row != names]  # a head that comes again
     cells = [[row[i] for _, row in rows] for i in range(len(names))]
     columns = _without_lists(where, list(zip(names, units, cells, strict=True)))
     kept = [column for column in columns if not _is_padding(column[0], column[2])]

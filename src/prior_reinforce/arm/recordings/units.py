@@ -71,7 +71,10 @@ _BRACKETS = re.compile(r"(?P<name>.+?)\s*[\[(]\s*(?P<unit>[^\[\]()]+?)\s*[\])]")
 _ENDING = re.compile(r"(?P<name>.+?)[_ ](?P<unit>[a-zµμ°]+)")
 _CAMEL = re.compile(r"(?P<name>.*[a-z0-9])(?P<unit>[A-Z][a-z]+|DEG|RAD|MM|CM|MS|US|NS)")
 """`panDeg`."""
-_NO_ENDING = {_ENDING: ("in", "min", "h"), _CAMEL: ("in", "min", "rev", "day", "share")}
+_NO_ENDING = {
+    _ENDING: ("in", "min", "h", "turn", "turns"),
+    _CAMEL: ("in", "min", "rev", "day", "share", "turn", "turns"),
+}
 """Words that are no unit there: in `plug_in`, `q_min`, `firstDay`."""
 _BEFORE_NUMBER = re.compile(r"(?P<name>.+?)_(?P<unit>deg|rad|mm|cm)(?P<number>_?\d+)", re.I)
 """`q_deg_0`."""
