@@ -19,10 +19,10 @@ from prior_reinforce.arm.recordings import (
     inspect,
     read,
 )
+from prior_reinforce.arm.recordings.outcome_units import in_units
 from prior_reinforce.arm.recordings.outcomes import (
     OUTCOMES_FILE,
     Outcomes,
-    in_units,
     missing_outcomes,
     table_beside,
     write_outcome_table,

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
+from prior_reinforce.arm.recordings.outcome_units import in_units
 from prior_reinforce.arm.recordings.outcomes import (
     OUTCOMES_FILE,
     SD,
     SOURCE,
     Outcomes,
-    in_units,
     outcomes_of,
     read_outcomes,
     write_outcome_table,

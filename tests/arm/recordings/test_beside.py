@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from prior_reinforce.arm.recordings import read_recordings
 from prior_reinforce.arm.recordings.beside import (
     columns_beside,
     frames_said,
@@ -13,7 +14,8 @@ from prior_reinforce.arm.recordings.beside import (
     with_rate,
 )
 from prior_reinforce.arm.recordings.naming import words
-from prior_reinforce.errors import FileFormatError
+from prior_reinforce.errors import FileFormatError, UnclearUnitsError
+from tests.arm.recordings.recorded import sampled
 
 T = np.arange(101) / 50
 S = np.clip((T - 0.3) / 1.2, 0, 1)
@@ -227,3 +229,18 @@ def test_numbered_columns_beside_are_one_group():
 )
 def test_a_clock_runs_with_the_times_and_a_rail_does_not(name, values, clock):
     assert is_clock(name, values, T) == clock
+
+
+def test_a_command_beside_what_was_measured_is_asked_about(tmp_path):
+    t, q = sampled(0, 50)
+    late = np.vstack([q[:1], q[:1], q[:-2]])
+    table = np.column_stack([t, q, late])
+    names = [f"q_{of}_{i}" for of in ("des", "act") for i in range(1, 8)]
+    np.savetxt(
+        tmp_path / "a.csv", table, delimiter=",", header=",".join(["t", *names]), comments=""
+    )
+    with pytest.raises(UnclearUnitsError, match="q_act repeats q_des") as asked:
+        read_recordings(tmp_path / "a.csv")
+    assert asked.value.options == "--key q_act"
+    (read,) = read_recordings(tmp_path / "a.csv", key=("q_act",))
+    np.testing.assert_allclose(read.positions, late)

@@ -18,7 +18,8 @@ from prior_reinforce.arm.recordings import (
     read_recordings,
 )
 from prior_reinforce.arm.recordings.naming import find_channels
-from prior_reinforce.arm.recordings.outcomes import in_units, read_outcomes
+from prior_reinforce.arm.recordings.outcome_units import in_units
+from prior_reinforce.arm.recordings.outcomes import read_outcomes
 from prior_reinforce.arm.robots import robot_limits
 from prior_reinforce.errors import FileFormatError, UnclearUnitsError
 from tests.arm.recordings.recorded import lerobot_set

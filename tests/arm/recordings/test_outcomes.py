@@ -14,9 +14,7 @@ from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
     InvalidDemonstrationsError,
-    UnclearUnitsError,
 )
-from prior_reinforce.units import base_of
 from tests.arm.recordings.recorded import OUTCOMES, write_csv, write_outcomes
 
 
@@ -74,30 +72,6 @@ def test_centimetres_in_a_columns_name_are_converted(tmp_path):
     np.testing.assert_allclose(outcomes.values, [(0.92, -0.05, 0.3, 1.5)])
     assert (outcomes.episodes, *outcomes.sd) == (("0",), 0.0)
     assert outcomes.units == ("m", "m", "m", None)
-
-
-def test_centimetres_that_nobody_names_are_refused_until_said(recording, tmp_path):
-    cm = {name: (100 * x, 100 * y) for name, (x, y) in OUTCOMES.items()}
-    path = write_outcomes(tmp_path, cm)
-    with pytest.raises(
-        UnclearUnitsError, match=r"x reaches 105 and y reaches 14, too far for an arm"
-    ):
-        import_demonstrations(recording, outcomes=path)
-    for said in ({"outcome_unit": "cm"}, {"take_guesses": True}):
-        result = import_demonstrations(recording, outcomes=path, **said)
-        np.testing.assert_allclose(result.demonstrations.outcomes_seen, list(OUTCOMES.values()))
-    named = table(tmp_path, path.read_text().replace("x,y", "x_cm,y_cm"))
-    with pytest.raises(ConfigurationError, match="--outcome-unit cm has no use"):
-        import_demonstrations(recording, outcomes=named, outcome_unit="cm")
-
-
-def test_an_angle_is_converted_to_the_unit_of_the_outcome(recording, tmp_path):
-    text = "\n".join(["episode,angle_deg", *(f"{i},{10 * i + 1}" for i in range(6))])
-    path = table(tmp_path, text)
-    kept = import_demonstrations(recording, outcomes=path, outcome_units=["deg"]).demonstrations
-    np.testing.assert_allclose(kept.outcomes_seen[:, 0], 10 * np.arange(6) + 1)
-    radians = import_demonstrations(recording, outcomes=path, outcome_units=["rad"]).demonstrations
-    np.testing.assert_allclose(radians.outcomes_seen[:, 0], np.deg2rad(10 * np.arange(6) + 1))
 
 
 def test_columns_in_another_order_are_matched_by_name(recording, tmp_path):
@@ -207,67 +181,6 @@ def test_the_uncertainty_may_be_the_first_column(tmp_path):
     np.testing.assert_allclose(found.sd, (0.02, 0))
 
 
-def test_one_uncertainty_is_of_one_unit(recording, tmp_path):
-    path = table(
-        tmp_path, "episode,x,turn,sd\n" + "".join(f"{i},{i},{int(i) % 2},1\n" for i in OUTCOMES)
-    )
-    with pytest.raises(
-        ConfigurationError, match=r"sd in .* is one number for components in m, rad"
-    ):
-        import_demonstrations(recording, outcomes=path, outcome_units=("m", "rad"))
-
-
-@pytest.mark.parametrize(("head", "unit"), [("episode,x [m],y [m]", None), ("episode,x,y", "m")])
-def test_centimetres_that_are_said_to_be_metres_are_refused(recording, tmp_path, head, unit):
-    rows = [f"{name},{100 * x},{100 * y}" for name, (x, y) in OUTCOMES.items()]
-    path = table(tmp_path, "\n".join([head, *rows]))
-    said = r"x is said to be in m and would reach 105 m.*call its column x \[cm\]"
-    with pytest.raises(InvalidDemonstrationsError, match=said):
-        import_demonstrations(recording, outcomes=path, outcome_unit=unit, take_guesses=True)
-
-
-@pytest.mark.parametrize(
-    ("head", "scale", "names", "units"),
-    [
-        ("angle [rad],apex [m]", (1, 1), ("angle", "apex"), ("rad", "m")),
-        ("angle [deg],apex [cm]", (180 / np.pi, 100), ("angle", "apex"), ("rad", "m")),
-        ("volume [ml],arrival [ms]", (1, 1000), ("volume", "arrival"), ("ml", "s")),
-        ("arrival_ms,wait (s)", (1000, 1), ("arrival", "wait"), ("s", "s")),
-        ("force [N],x (ahead)", (1, 1), ("force", "x (ahead)"), ("N", "m")),
-    ],
-)
-def test_a_unit_in_the_tables_head_is_the_outcomes(recording, tmp_path, head, scale, names, units):
-    rows = [f"{name},{scale[0] * x:.12g},{scale[1] * y:.12g}" for name, (x, y) in OUTCOMES.items()]
-    path = table(tmp_path, "\n".join([f"episode,{head}", *rows]))
-    result = import_demonstrations(recording, outcomes=path)
-    assert result.demonstrations.outcome_format.names == names
-    assert result.demonstrations.outcome_format.units == units
-    np.testing.assert_allclose(result.demonstrations.outcomes_seen, list(OUTCOMES.values()))
-    assert f"{names[0]} 0.8 to 1.05 {units[0]}" in result.preview.text
-
-
-def test_metres_that_are_said_may_be_as_far_as_a_bat_strikes(recording, tmp_path):
-    rows = [f"{name},{9 + x},{y}" for name, (x, y) in OUTCOMES.items()]
-    path = table(tmp_path, "\n".join(["episode,x [m],y [m]", *rows]))
-    said = import_demonstrations(recording, outcomes=path, outcome_unit="m")
-    assert said.demonstrations.outcomes_seen.max() > 9
-    with pytest.raises(UnclearUnitsError, match=r"10.05 m \(if that is in cm, .*--outcome-unit m"):
-        import_demonstrations(recording, outcomes=path)  # a table that we wrote is headed so
-    bare = table(tmp_path, "\n".join(["episode,x,y", *rows]))
-    assert import_demonstrations(recording, outcomes=bare, outcome_unit="m").demonstrations.n == 6
-    with pytest.raises(InvalidDemonstrationsError, match=r"x 10.05, y 0.14, .* --outcome-unit if"):
-        import_demonstrations(recording, outcomes=bare)
-
-
-def test_a_unit_that_the_task_does_not_have_says_where_it_stands(recording, tmp_path):
-    rows = [f"{name},{x},{y}" for name, (x, y) in OUTCOMES.items()]
-    path = table(tmp_path, "\n".join(["episode,x [ml],y [m]", *rows]))
-    with pytest.raises(
-        ConfigurationError, match=r"x in .* is in ml, but its unit is to be m; .*workspace.toml"
-    ):
-        import_demonstrations(recording, outcomes=path, outcome_units=("m", "m"))
-
-
 @pytest.mark.parametrize(
     "unit", ["m", "meters", "degrees", "deg", "°", "s", "seconds", "counts", ""]
 )
@@ -284,32 +197,12 @@ def test_a_table_that_is_written_to_be_filled_in_is_read_in_the_units_of_the_tas
     np.testing.assert_allclose(result.demonstrations.outcomes_seen, list(OUTCOMES.values()))
 
 
-@pytest.mark.parametrize(("head", "noise"), [("x [cm],y [cm]", 0.02), ("x [ms],y [ms]", 0.002)])
-def test_how_uncertain_outcomes_are_is_in_the_unit_of_the_first(recording, tmp_path, head, noise):
-    rows = [f"{name},{100 * x},{100 * y},2" for name, (x, y) in OUTCOMES.items()]
-    path = table(tmp_path, "\n".join([f"episode,{head},sd", *rows]))
-    demonstrations = import_demonstrations(recording, outcomes=path).demonstrations
-    np.testing.assert_allclose(demonstrations.outcome_noise, noise)
-
-
 def test_an_episode_called_like_a_formula_is_no_formula_in_the_table(tmp_path):
     path = tmp_path / "outcomes.csv"
     name = "=cmd|' -C calc'!A0"
     write_outcome_table(path, {name: (0.9, 0.1)}, ["x", "y"], ["m", "m"])
     assert path.read_text().splitlines()[1].startswith("'=cmd")
     assert read_outcomes(path).episodes == (name,)
-
-
-def test_inches_in_the_head_or_said(recording, tmp_path):
-    rows = [f"{name},{x / 0.0254},{y / 0.0254}" for name, (x, y) in OUTCOMES.items()]
-    path = table(tmp_path, "\n".join(["episode,x [in],y (inches)", *rows]))
-    kept = import_demonstrations(recording, outcomes=path).demonstrations
-    np.testing.assert_allclose(kept.outcomes_seen, list(OUTCOMES.values()))
-    bare = table(tmp_path, "\n".join(["episode,x,y", *rows]))
-    with pytest.raises(UnclearUnitsError, match=r"looks like cm \(or inches: --outcome-unit in\)"):
-        import_demonstrations(recording, outcomes=bare)
-    said = import_demonstrations(recording, outcomes=bare, outcome_unit="in").demonstrations
-    np.testing.assert_allclose(said.outcomes_seen, list(OUTCOMES.values()))
 
 
 @pytest.mark.parametrize(
@@ -352,40 +245,6 @@ def test_a_point_before_three_digits_between_semicolons_is_doubted(tmp_path, hea
         read_outcomes(path)
 
 
-@pytest.mark.parametrize("head", ["x,y", "x [m],y [m]"])
-@pytest.mark.parametrize("unit", [None, "cm"])
-def test_a_row_in_another_unit_is_named(recording, tmp_path, head, unit):
-    rows = [f"{name},{x},{y}" for name, (x, y) in OUTCOMES.items()]
-    rows[3] = "3," + ",".join(f"{100 * number:g}" for number in OUTCOMES["3"])
-    path = table(tmp_path, "\n".join([f"episode,{head}", *rows]))
-    if unit and "[" in head:
-        return
-    with pytest.raises(InvalidDemonstrationsError, match="3 is in another unit than the others"):
-        import_demonstrations(recording, outcomes=path, outcome_unit=unit, take_guesses=True)
-
-
-def test_a_spread_as_large_as_the_outcomes_lie_apart_is_doubted(recording, tmp_path):
-    rows = [f"{name},{x},{y},0.5" for name, (x, y) in OUTCOMES.items()]
-    path = table(tmp_path, "\n".join(["episode,x,y,sd", *rows]))
-    said = r"sd in .* is up to 0.5 m, and all outcomes are within 0.25 m .*: sd \[cm\], or sd \[m\]"
-    with pytest.raises(InvalidDemonstrationsError, match=said):
-        import_demonstrations(recording, outcomes=path)
-    for unit, noise in (("cm", 0.005), ("m", 0.5)):
-        head = f"episode,x,y,sd [{unit}]"
-        found = import_demonstrations(
-            recording, outcomes=table(tmp_path, "\n".join([head, *rows]))
-        ).demonstrations
-        np.testing.assert_allclose(found.outcome_noise, noise)
-
-
-def test_a_column_may_end_in_inches_where_the_task_has_that_name(tmp_path):
-    (tmp_path / "outcomes.csv").write_text("episode,distance_in,plug_in\n0,10,1\n1,12,2\n")
-    found = read_outcomes(tmp_path / "outcomes.csv", ["distance"])
-    np.testing.assert_allclose(found.values, [[0.254], [0.3048]])
-    assert found.units == ("m",)
-    assert read_outcomes(tmp_path / "outcomes.csv").names == ("distance_in", "plug_in")
-
-
 @pytest.mark.parametrize(
     ("text", "says"),
     [
@@ -407,29 +266,6 @@ def rows_of_outcomes(scale=(1, 1), first=0, name="{}"):
         f"{name.format(int(episode) + first)},{scale[0] * x:.6g},{scale[1] * y:.6g}"
         for episode, (x, y) in OUTCOMES.items()
     ]
-
-
-@pytest.mark.parametrize("unit", ["mm", "cm"])
-def test_lengths_of_one_table_have_one_unit(recording, tmp_path, unit):
-    scale = 1 / base_of(unit)[1]
-    path = table(tmp_path, "\n".join(["episode,x,y", *rows_of_outcomes((scale, scale))]))
-    with pytest.raises(UnclearUnitsError, match=f"like {unit}") as asked:
-        import_demonstrations(recording, outcomes=path)
-    assert asked.value.options == f"--outcome-unit {unit}"
-    seen = import_demonstrations(recording, outcomes=path, outcome_unit=unit)
-    np.testing.assert_allclose(seen.demonstrations.outcomes_seen, list(OUTCOMES.values()))
-
-
-@pytest.mark.parametrize("scale", [(1, 100), (100, 1), (1, 1000)])
-def test_lengths_in_two_units_have_to_be_said_each(recording, tmp_path, scale):
-    path = table(tmp_path, "\n".join(["episode,x,y", *rows_of_outcomes(scale)]))
-    with pytest.raises(InvalidDemonstrationsError, match=r"several units: .* in the head"):
-        import_demonstrations(recording, outcomes=path)
-    units = [{1: "m", 100: "cm", 1000: "mm"}[each] for each in scale]
-    head = f"episode,x [{units[0]}],y [{units[1]}]"
-    path = table(tmp_path, "\n".join([head, *rows_of_outcomes(scale)]))
-    seen = import_demonstrations(recording, outcomes=path).demonstrations.outcomes_seen
-    np.testing.assert_allclose(seen, list(OUTCOMES.values()))
 
 
 @pytest.mark.parametrize("options", [{}, {"leave_out": ["0"]}])

@@ -22,10 +22,10 @@ from prior_reinforce.arm.console.verbs import Seen, Verbs
 from prior_reinforce.arm.console.view import State
 from prior_reinforce.arm.recordings import Preprocessing, ReadOptions, Recordings, inspect, read
 from prior_reinforce.arm.recordings.naming import find_channels, numbered_like
+from prior_reinforce.arm.recordings.outcome_units import in_units
 from prior_reinforce.arm.recordings.outcomes import (
     OUTCOMES_FILE,
     SD,
-    in_units,
     missing_outcomes,
     outcomes_of,
     write_outcome_table,

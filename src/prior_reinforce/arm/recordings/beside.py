@@ -10,6 +10,7 @@ import re
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -88,6 +89,7 @@ _SCALES = (1.0, TURN["deg"] / TURN["rad"], TURN["rad"] / TURN["deg"], 1000.0, 10
 _OTHER_ZERO = 1.0
 """Part of its spread by which a command lies beside the motion at most, as under a load. Ours; what
 starts from another pose is another arm."""
+_MEASURED = re.compile(r"act|meas|real|state|curr|ist(?![a-z])|obs|feedback", re.IGNORECASE)
 _SIDE = re.compile(
     r"(?<!b)right|left|izq|der(?=ech)|gauche|droite?|(robot|arm|hand|gripper)_?\d+"
     r"|(?<![a-z])[lr](?![a-z])"
@@ -355,6 +357,18 @@ def moves_beside(
         if not clocks and (_of_another(name, called) or not _follows(columns, motion)):
             found[said] = float(np.nanmin(moving)), float(np.nanmax(moving))
     return found
+
+
+def twin_vectors(names: Sequence[str], values: Positions) -> Iterator[Ambiguity]:
+    """Ask which of two vectors of numbered columns is the motion: one repeats the other."""
+    groups = [(s, g) for s, g in vectors(names).items() if not says_no_position(s)]
+    for (one, own), (other, of_other) in combinations(groups, 2):
+        alike = len(own) == len(of_other) and not _of_another(other, [one])
+        if alike and _follows(values[:, own], values[:, of_other]):
+            measured = other if _MEASURED.search(other) else one
+            what = f"{other} repeats {one}, as a command does"
+            yield Ambiguity(f"{what}: it looks as if {measured} were measured", f"--key {measured}")
+            return
 
 
 def _is_series(name: str, moving: np.ndarray, others: Arrays) -> bool:

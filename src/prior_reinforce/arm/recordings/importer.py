@@ -19,12 +19,12 @@ from prior_reinforce.arm.recordings.bounds import check_numbers
 from prior_reinforce.arm.recordings.inspection import Inspection, inspect
 from prior_reinforce.arm.recordings.judging import doubts_of_times
 from prior_reinforce.arm.recordings.options import ReadOptions
+from prior_reinforce.arm.recordings.outcome_units import in_units
 from prior_reinforce.arm.recordings.outcomes import (
     OUTCOMES_FILE,
     Outcomes,
     check_rows,
     digits_at_end,
-    in_units,
     outcomes_of,
     read_outcomes,
     table_beside,

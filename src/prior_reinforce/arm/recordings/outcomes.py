@@ -23,19 +23,16 @@ from prior_reinforce.arm.recordings.recording import EPISODE_COLUMNS
 from prior_reinforce.arm.recordings.tables import Table, read_table
 from prior_reinforce.arm.recordings.units import (
     CHANNEL_UNITS,
-    Ambiguity,
-    conversion,
     is_possible,
-    judge_unit,
     known_unit,
     listed,
     split_unit,
 )
 from prior_reinforce.arrays import Points
-from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidDemonstrationsError
+from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError
 from prior_reinforce.files import as_cell, from_cell, write
 from prior_reinforce.formats import OutcomeFormat
-from prior_reinforce.units import base_of, factor, kind_of
+from prior_reinforce.units import base_of
 from prior_reinforce.wording import PLACE_WORDS, axes_of
 
 OUTCOMES_FILE = "outcomes.csv"
@@ -51,14 +48,8 @@ _DATED = re.compile(
 """A date, or one with its time of day, at the end of a name."""
 _UNCERTAINTY = re.compile(r"(.*[^a-z])?(sd|std|stdev|sigma|stderr|uncertainty)([^a-z].*)?|.*±.*")
 _SEMICOLONS = "semicolons, where a comma is the decimal sign"
-_FAR, _FEW = 10.0, 3
-"""Times as far as all others that an outcome is in another unit, and outcomes of which it is not
-yet known how far they lie apart. Ours."""
 _RADII = ("r", "radius", "distance", "dist", "range")
 _BEARINGS = ("angle", "bearing", "azimuth", "theta", "phi", "heading", "direction")
-_NEAR_THE_BASE = 0.05
-"""So near the base along a component, in [m], hardly any table of outcomes stays. Ours: a throw
-straight ahead scatters as much to the side; then the units are to be said in the head."""
 SOURCE = "source"
 _NOT_COMPONENTS = (SD, SOURCE, "note", "notes", "comment", "comments")
 
@@ -273,137 +264,6 @@ def _finite(path: Path, table: Table, row: int, column: int) -> float:
             f"{remedy}"
         )
     return value
-
-
-def in_units(
-    outcomes: Outcomes, wanted: Sequence[str] | None, given: str | None
-) -> tuple[Outcomes, tuple[Ambiguity, ...]]:
-    """Convert outcomes to the wanted units; also return what is only inferred of their units.
-
-    `wanted` None takes the stated units, or metres. `given` is the unit of components whose source
-    states none, or of all to confirm an ambiguous one; None takes the wanted unit, or if no arm
-    reaches that far, a plausible one.
-
-    Raises:
-        ConfigurationError: A unit that cannot be converted, `given` has no use, or one `sd` for
-            components of several units.
-        InvalidDemonstrationsError: A stated unit is impossible.
-    """
-    said, where, given = outcomes.units, outcomes.where, given and (known_unit(given) or given)
-    if wanted is None:
-        wanted = [base_of(unit or given or "m")[0] for unit in said]
-    if len(wanted) != len(said):
-        return outcomes, ()  # refused when they are joined with the demonstrations
-    if given is not None and None not in said and given not in said:
-        raise ConfigurationError(
-            f"--outcome-unit {given} has no use, since {where} says its units; drop it"
-        )
-    if outcomes.sd.any() and len(set(wanted)) > 1:
-        raise ConfigurationError(
-            f"{SD} in {where} is one number for components in {', '.join(wanted)}; leave that "
-            "column out"
-        )
-    _refuse_odd_row(outcomes, wanted)
-    reach = np.abs(outcomes.values).max(axis=0, initial=0.0, where=~np.isnan(outcomes.values))
-    unsaid = {
-        j: known_unit(spelt) or spelt
-        for j, (own, spelt) in enumerate(zip(said, wanted, strict=True))
-        if own is None and given is None and kind_of(known_unit(spelt) or spelt) == "length"
-    }
-    together = max((reach[j] for j in unsaid), default=0.0)  # lengths of one table have one unit
-    scale, unclear = [], dict[str, list[str]]()
-    for j, (name, own, spelt) in enumerate(zip(outcomes.names, said, wanted, strict=True)):
-        unit, largest = known_unit(spelt) or spelt, reach[j]
-        judged = together if len({*unsaid.values()}) == 1 and j in unsaid else largest
-        recorded = own or given or judge_unit(unit, judged) or unit
-        if base_of(recorded)[0] != base_of(unit)[0]:
-            raise ConfigurationError(
-                f"{name} in {where} is in {recorded}, but its unit is to be {spelt}; correct "
-                "either (a workspace has it in workspace.toml, [outcome])"
-            )
-        scale.append(conversion(recorded, unit, f"{name} in {where}"))
-        most = largest * scale[-1]
-        looks = judge_unit(unit, most)
-        rename = f"if that is in {looks}, call its column {name} [{looks}]"
-        if not is_possible(unit, most):
-            raise InvalidDemonstrationsError(
-                f"in {where}, {name} is said to be in {recorded} and would reach {most:.4g} "
-                f"{unit}, too far for an arm; {rename}"
-            )
-        if own is None and given is None and recorded != unit:
-            unclear.setdefault(recorded, []).append(f"{name} reaches {largest:.4g}")
-        elif own is not None and given != unit and looks != unit:
-            unclear.setdefault(unit, []).append(f"{name} reaches {most:.4g} {unit} ({rename})")
-    _refuse_one_unit(outcomes, wanted, [*unclear])
-    inches = " (or inches: --outcome-unit in)"
-    ambiguities = tuple(
-        Ambiguity(
-            f"in {where}, {' and '.join(reached)}, too far for an arm"
-            + (f": it looks like {unit}{inches * (unit == 'cm')}" if unit not in said else ""),
-            f"--outcome-unit {unit}",
-        )
-        for unit, reached in unclear.items()
-    )
-    first = known_unit(wanted[0]) or wanted[0] if wanted else ""
-    sd_scale = conversion(outcomes.sd_unit, first, SD) if outcomes.sd_unit else [*scale, 1.0][0]
-    values, sd = outcomes.values * np.array(scale), outcomes.sd * sd_scale
-    converted = replace(outcomes, values=values, sd=sd, units=tuple(wanted), sd_unit=first)
-    apart = float(np.nanmax(np.ptp(values, axis=0), initial=0.0)) if len(values) else 0.0
-    if outcomes.sd_unit is None and 0 < apart <= sd.max() and len(values) > _FEW:
-        raise InvalidDemonstrationsError(
-            f"{SD} in {where} is up to {sd.max():.4g} {first}, and all outcomes are within "
-            f"{apart:.4g} {first} of each other; say its unit in its head: {SD} [cm], or "
-            f"{SD} [{first}] if that is right"
-        )
-    return converted, ambiguities
-
-
-def _refuse_one_unit(outcomes: Outcomes, wanted: Sequence[str], unclear: Sequence[str]) -> None:
-    """Refuse components that look like several units, of which no option can give each its own.
-
-    So do numbers of which some are plausible as they are: were all in the unit that the others look
-    like, the object would hardly leave the base along them.
-
-    InvalidDemonstrationsError says what to write in the head.
-    """
-    far = np.nanmax(np.abs(outcomes.values), axis=0, initial=0.0)
-    own = [known_unit(unit) or unit for unit in wanted]
-    looks = [judge_unit(unit, most) or unit for unit, most in zip(own, far, strict=True)]
-    unsaid = [j for j, unit in enumerate(outcomes.units) if unit is None]
-    several = len({kind_of(unit) for unit in unclear}) > 1
-    for unit in unclear:
-        alike = [j for j in unsaid if kind_of(own[j]) == kind_of(unit) == "length"]
-        near = [far[j] * (factor(unit, "m") or 1.0) for j in alike if looks[j] == own[j]]
-        several |= any(0 < most < _NEAR_THE_BASE for most in near)
-    if several:
-        names = [outcomes.names[j] for j in unsaid]
-        each = ", ".join(f"{outcomes.names[j]} {far[j]:.4g}" for j in unsaid)
-        heads = [f"{name} [{looks[j]}]" for name, j in zip(names, unsaid, strict=True)]
-        raise InvalidDemonstrationsError(
-            f"in {outcomes.where}, the largest numbers are {each}, which look like several units: "
-            f"say each one's in the head (if they are these: {', '.join(heads)}), or "
-            "--outcome-unit if all are in one"
-        )
-
-
-def _refuse_odd_row(outcomes: Outcomes, units: Sequence[str]) -> None:
-    """Refuse a few rows that are in another unit than the others: 95 beside 0.8 and 1.05.
-
-    InvalidDemonstrationsError names them, if an arm reaches the others and not these.
-    """
-    columns = np.abs(outcomes.values).T
-    for column, own, unit in zip(columns, outcomes.units, units, strict=True):
-        unit = known_unit(unit) or unit
-        odd = np.array([judge_unit(unit, number) not in (unit, None) for number in column])
-        if not 0 < odd.sum() < len(odd) / 2 or (own and is_possible(own, max(column[odd]))):
-            continue
-        others = np.nanmax(column[~odd], initial=0.0)
-        if min(column[odd]) > _FAR * others:
-            raise InvalidDemonstrationsError(
-                f"in {outcomes.where}, {listed(np.array(outcomes.episodes)[odd].tolist())} is in "
-                f"another unit than the others: {min(column[odd]):g} beside {others:g} at most; "
-                "write all in one, and name it in the head"
-            )
 
 
 def missing_outcomes(episodes: Sequence[str], outcomes: Outcomes) -> list[str]:

@@ -1,0 +1,219 @@
+"""The times of a table's rows, whatever they are called, or what is missing of them."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from prior_reinforce.arm.recordings import read_recordings
+from prior_reinforce.errors import (
+    ConfigurationError,
+    FileFormatError,
+    UnclearUnitsError,
+)
+from tests.arm.recordings.recorded import (
+    JOINTS,
+    sampled,
+)
+
+
+@pytest.mark.slow
+def test_an_index_without_a_name_is_the_time(tmp_path):
+    """As `DataFrame.to_csv` writes one: of dates it is taken, of numbers only when it is said."""
+    t, q = sampled(0, 100)
+    start = pd.Timestamp("2026-11-21T10:00", tz="Europe/Berlin")
+    frame = pd.DataFrame(q, columns=JOINTS, index=start + pd.to_timedelta(t, unit="s"))
+    frame.to_csv(tmp_path / "0.csv")
+    (recording,) = read_recordings(tmp_path)
+    np.testing.assert_allclose(recording.times, t, atol=1e-9)
+    assert (recording.names, recording.clock) == (JOINTS, "column 1 in ns")
+    frame.set_axis(1000 * t).to_csv(tmp_path / "0.csv")
+    with pytest.raises(UnclearUnitsError) as caught:
+        read_recordings(tmp_path)
+    assert caught.value.options == "--time-column 1 --time-unit ms"
+    (recording,) = read_recordings(tmp_path, time_column="1", time_unit="ms")
+    np.testing.assert_allclose(recording.times, t, atol=1e-9)
+    frame.set_axis(np.arange(len(t)) + 40).to_csv(tmp_path / "0.csv")  # rows that were cut out
+    (recording,) = read_recordings(tmp_path, rate=100, joints=JOINTS)
+    np.testing.assert_allclose(recording.positions, q)
+    assert recording.remarks == ()
+    for how in ({}, {"time_column": "none"}):
+        (recording,) = read_recordings(tmp_path, rate=100, **how)
+        assert recording.names == JOINTS
+        np.testing.assert_allclose(recording.positions, q)
+        why = "column 1 left out, which rises with every row, as times and counters do"
+        assert recording.remarks == (why,)
+
+
+def test_dates_count_as_times(tmp_path):
+    t, q = sampled(0, 100)
+    start = pd.Timestamp("2026-11-21T10:59:59.5")
+    frame = pd.DataFrame(q, columns=JOINTS)
+    frame.insert(0, "timestamp", start + pd.to_timedelta(t, unit="s"))
+    frame.to_csv(tmp_path / "0.csv", index=False, date_format="%Y-%m-%dT%H:%M:%S.%f")
+    (recording,) = read_recordings(tmp_path)
+    np.testing.assert_allclose(recording.times, t, atol=2e-6)
+
+
+def test_the_column_of_times_may_be_named_or_left_unread(tmp_path):
+    (tmp_path / "a.csv").write_text("clock,t,a\n0,5,1\n10,5,2\n20,5,4\n")
+    (recording,) = read_recordings(tmp_path, time_column="clock", time_unit="ms", joints=["a"])
+    np.testing.assert_allclose(recording.times, [0, 0.01, 0.02])
+    (recording,) = read_recordings(tmp_path, time_column="none", rate=50, joints=["a"])
+    np.testing.assert_allclose(recording.times, [0, 0.02, 0.04])
+
+
+def recorded_at_50(path, head, first, rows=100):
+    """A table of two joints, and a first column that is made of the times in [s]."""
+    t = np.arange(rows) / 50
+    joints = np.column_stack([np.sin(t), np.cos(t)])
+    np.savetxt(
+        path / "a.csv", np.column_stack([first(t), joints]), "%.9f", ",",
+        header=f"{head},a,b", comments="",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("head", ["tid [s]", "tid", "chrono_s"])
+@pytest.mark.parametrize("late", [0.0, 0.004])
+def test_whatever_tells_the_time_is_held_against_the_rate(tmp_path, head, late):
+    recorded_at_50(tmp_path, head, lambda t: t + late * np.sin(40 * t))
+    with pytest.raises(ConfigurationError, match=r"--rate 100, but tid|chrono.* says .* Hz; drop"):
+        read_recordings(tmp_path, rate=100)
+    (recording,) = read_recordings(tmp_path, rate=50)
+    assert recording.names == ("a", "b")
+    np.testing.assert_allclose(recording.times, np.arange(100) / 50, atol=0.005)
+
+
+@pytest.mark.parametrize("head", ["frame", "nr", ""])
+def test_a_counter_that_skips_says_where_frames_are_missing(tmp_path, head):
+    recorded_at_50(tmp_path, head, lambda t: np.round(t * 50) + 12 * (t > 0.99))
+    (recording,) = read_recordings(tmp_path, rate=50)
+    assert recording.names == ("a", "b")
+    assert np.diff(recording.times).max() == pytest.approx(13 / 50)
+
+
+def test_times_that_go_on_where_a_counter_skips_are_refused(tmp_path):
+    recorded_at_50(
+        tmp_path, "t,frame", lambda t: np.column_stack([t, np.round(t * 50) + 12 * (t > 0.99)])
+    )
+    with pytest.raises(FileFormatError, match=r"t and frame part by 0.24 s, most at frame 50"):
+        read_recordings(tmp_path)
+    assert read_recordings(tmp_path, time_column="t")[0].period == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize(("names", "part"), [("tv_sec,tv_usec", 1e6), ("secs,msecs", 1e3)])
+def test_seconds_and_their_parts_are_one_time(tmp_path, names, part):
+    recorded_at_50(
+        tmp_path, names,
+        lambda t: np.column_stack([np.floor(t + 7.31), np.round((t + 7.31) % 1 * part)]),
+    )  # fmt: skip
+    (recording,) = read_recordings(tmp_path)
+    np.testing.assert_allclose(recording.times, np.arange(100) / 50, atol=1e-9)
+
+
+def test_a_rail_at_constant_speed_is_a_channel_and_no_clock(tmp_path):
+    t, q = sampled(0, 50)
+    table = np.column_stack([t, q[:, 1], 0.1 + 0.25 * t, np.arange(len(t)) + 7, 1e3 * t + 5])
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="t,a,rail,n,ms", comments="")
+    assert read_recordings(tmp_path)[0].names == ("a", "rail")
+    assert [*read_recordings(tmp_path, joints=["a"])[0].left_out] == ["rail"]
+
+
+def table(folder, head, columns, above=""):
+    rows = [",".join(map(repr, map(float, row))) for row in np.column_stack(columns)]
+    path = folder / "t.csv"
+    path.write_text("\n".join([*([above] if above else []), head, *rows]) + "\n")
+    return path
+
+
+JITTER = np.cumsum(np.where(np.arange(60) % 3, 0.009, 0.012))
+SWING = np.sin(np.linspace(0, 3, 60))
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("min", 60), ("h", 3600), ("minutes", 60)])
+def test_times_in_minutes_and_hours(tmp_path, unit, scale):
+    (one,) = read_recordings(table(tmp_path, f"Time [{unit}],a", [JITTER / scale, SWING]))
+    np.testing.assert_allclose(one.times, JITTER - JITTER[0], atol=1e-9)
+
+
+def test_a_unit_of_times_that_is_not_known_is_refused_by_its_name(tmp_path):
+    path = table(tmp_path, "Time [fortnight],a", [JITTER, SWING])
+    with pytest.raises(FileFormatError, match=r"in 'fortnight', which is no known .*--time-unit"):
+        read_recordings(path)
+    assert read_recordings(path, time_unit="s")[0].duration == pytest.approx(np.ptp(JITTER))
+    assert read_recordings(table(tmp_path, "Time (relative),a", [JITTER, SWING]))
+
+
+@pytest.mark.parametrize(
+    ("whole", "part", "scale"),
+    [("seconds", "nanos", 1e9), ("sec", "micros", 1e6), ("stamp_s", "stamp_millis", 1e3)],
+)
+def test_seconds_and_a_part_of_one_by_any_name(tmp_path, whole, part, scale):
+    t = JITTER + 1_760_000_000
+    parts = np.round((t % 1) * scale)
+    (one,) = read_recordings(table(tmp_path, f"{whole},{part},a", [t // 1, parts, SWING]))
+    np.testing.assert_allclose(one.times, JITTER - JITTER[0], atol=2 / scale + 1e-6)
+
+
+def test_times_since_the_row_before_are_summed(tmp_path):
+    steps = np.diff(JITTER, prepend=JITTER[0])
+    for head, scale in (("dt", 1), ("dt_ms", 1000)):
+        path = table(tmp_path, f"{head},a", [steps * scale, SWING])
+        (one,) = read_recordings(path)
+        np.testing.assert_allclose(one.times, JITTER - JITTER[0], atol=1e-9)
+        assert one.names == ("a",)
+        with pytest.raises(ConfigurationError, match=rf"--rate 50, but {head} in m?s says 111"):
+            read_recordings(path, rate=50)
+
+
+@pytest.mark.parametrize("said", ["fps: 40", "robot: UR5e, sample rate = 40 Hz", "dt: 25 ms"])
+def test_the_rate_in_a_comment_holds_for_a_column_of_frames(tmp_path, said):
+    path = table(tmp_path, "frame,a", [np.arange(60), SWING], above=f"# {said}")
+    assert read_recordings(path)[0].period == pytest.approx(0.025)
+    assert read_recordings(path, rate=40)[0].period == pytest.approx(0.025)
+    with pytest.raises(ConfigurationError, match="says 40 frames a second in its comment"):
+        read_recordings(path, rate=100)
+    skipping = np.delete(np.arange(61), 30)
+    path = table(tmp_path, "frame,a", [skipping, SWING], above=f"# {said}")
+    assert read_recordings(path)[0].duration == pytest.approx(1.5)
+
+
+def test_a_rate_in_a_comment_says_nothing_against_times(tmp_path):
+    path = table(tmp_path, "t,a", [JITTER, SWING], above="# control rate: 500\n# fps: 30")
+    for how in ({}, {"rate": 111}):
+        assert read_recordings(path, **how)[0].duration == pytest.approx(np.ptp(JITTER))
+
+
+def test_the_take_whose_times_are_in_another_unit_is_named(tmp_path):
+    for i in range(3):
+        path = table(tmp_path, "time,a", [JITTER * (1000 if i == 1 else 1), SWING])
+        path.rename(tmp_path / f"t{i}.csv")
+    with pytest.raises(UnclearUnitsError, match=r"t1: time in s would be .*looks like ms") as asked:
+        read_recordings(tmp_path)
+    assert asked.value.options == "--leave-out t1"
+    assert len(read_recordings(tmp_path, leave_out=["t1"])) == 2
+    with pytest.raises(UnclearUnitsError, match=r"t0, t2: time in ms, as --time-unit") as asked:
+        read_recordings(tmp_path, time_unit="ms")
+    assert "--leave-out t1" in asked.value.options
+
+
+def test_a_line_of_means_below_is_named_and_not_a_missing_time(tmp_path):
+    t, q = sampled(0, 50)
+    rows = [",".join(map(repr, r)) for r in np.c_[t, q].tolist()]
+    text = "\n".join([",".join(("Zeit [s]", *JOINTS)), *rows, "Mittelwert,0,0,0,0,0,0,0"])
+    (tmp_path / "log.csv").write_text(text)
+    with pytest.raises(
+        FileFormatError, match=rf"line {len(t) + 2}: Zeit .* is 'Mittelwert'.* take"
+    ):
+        read_recordings(tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize("name", ["frame", "Sample", "step_index"])
+def test_a_counter_is_asked_for_its_rate_and_is_no_clock_in_ms(tmp_path, name):
+    t, q = sampled(0, 500)
+    rows = [",".join(map(repr, r)) for r in np.c_[np.arange(len(t)), q].tolist()]
+    (tmp_path / "log.csv").write_text("\n".join([",".join((name, *JOINTS)), *rows]))
+    with pytest.raises(UnclearUnitsError, match="counts frames") as asked:
+        read_recordings(tmp_path / "log.csv")
+    assert "--time-unit frame --rate HZ" in asked.value.options
+    (read,) = read_recordings(tmp_path / "log.csv", time_column=name, time_unit="frame", rate=500)
+    np.testing.assert_allclose(read.times, t)
