@@ -8,7 +8,14 @@ from matplotlib.image import imread
 
 from prior_reinforce.arm.recordings import Preprocessing, import_demonstrations
 from prior_reinforce.arm.recordings.preview import hull_corners
-from tests.arm.recordings.recorded import JOINTS, OUTCOMES, write_bags, write_npz, write_outcomes
+from tests.arm.recordings.recorded import (
+    JOINTS,
+    OUTCOMES,
+    write_bags,
+    write_csv,
+    write_npz,
+    write_outcomes,
+)
 
 
 @pytest.fixture(scope="module")
@@ -153,3 +160,11 @@ def test_when_a_gripper_changes_is_marked(folder):
     times = marked._changes(demos.action_dim)
     assert len(times) == demos.n
     np.testing.assert_allclose(times, 0.4 * demos.horizon * form.dt, atol=2 * form.dt)
+
+
+@pytest.mark.parametrize(("scale", "said"), [(1.0, False), (0.1, True)])
+def test_outcomes_that_all_lie_at_the_base_are_doubted(tmp_path, scale, said):
+    folder = write_csv(tmp_path)
+    near = {name: (scale * x, scale * y) for name, (x, y) in OUTCOMES.items()}
+    text = import_demonstrations(folder, outcomes=near).preview.text
+    assert ("no errors from a target" in text) == said

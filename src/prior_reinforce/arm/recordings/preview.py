@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from prior_reinforce.arm.recordings.inspection import Inspection, in_rows, say_s
 from prior_reinforce.generators.timing.events import find_transitions
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.terminal import plain
+from prior_reinforce.wording import axes_of, in_words
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,6 +28,8 @@ _LONGEST_NAME = 18
 """Characters of an episode's name that a panel has room for."""
 _LEAST_RANGE = 0.2
 """Smallest vertical range of a channel's panel, as a share of the largest motion in its unit."""
+_AT_THE_BASE = 0.2
+"""So near the base, in [m], nothing is thrown or pushed (ours)."""
 Corners = Int[np.ndarray, " corners"]
 PlanePoints = Float[np.ndarray, "n 2"]
 
@@ -61,7 +65,17 @@ class Preview:
             "look at that in the table"
             for slip in slips(self.demonstrations, self.episodes)
         )
-        return (*self.inspection.remarks, *alike, *doubted)
+        return (*self.inspection.remarks, *self._near_base(), *alike, *doubted)
+
+    def _near_base(self) -> Iterator[str]:
+        """Say it if all outcomes lie at the base, as errors from a target would."""
+        form, seen = self.demonstrations.outcome_format, self.demonstrations.outcomes_seen
+        far = float(np.linalg.norm(seen, axis=1).max())
+        if in_words(form) and axes_of(form)[:2] == [0, 1] and far < _AT_THE_BASE:
+            yield (
+                f"all outcomes are within {100 * far:.2g} cm of the base: they are to be places, "
+                "counted from the base, and no errors from a target"
+            )
 
     @property
     def text(self) -> str:
