@@ -220,3 +220,15 @@ def test_what_moves_at_a_rate_of_its_own_is_named(tmp_path):
         file["home"] = sampled(0, 50)[1][0]
     (recording,) = read_recordings(tmp_path / "throw.hdf5", rate=50)
     assert [*recording.left_out] == ["gripper/width (35 frames, beside 86)"]
+
+
+def test_an_array_a_joint_is_found_by_its_path(tmp_path):
+    t, q = sampled(0, 50)
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["time"] = t
+        for k, joint in reversed([*enumerate(JOINTS)]):
+            file[f"joints/{joint}/position"] = q[:, k]
+            file[f"joints/{joint}/velocity"] = np.gradient(q[:, k], t)
+    (read,) = read_recordings(tmp_path / "a.h5", joints=JOINTS)
+    np.testing.assert_allclose(read.positions, q)
+    np.testing.assert_allclose(read.times, t)

@@ -217,3 +217,17 @@ def test_a_counter_is_asked_for_its_rate_and_is_no_clock_in_ms(tmp_path, name):
     assert "--time-unit frame --rate HZ" in asked.value.options
     (read,) = read_recordings(tmp_path / "log.csv", time_column=name, time_unit="frame", rate=500)
     np.testing.assert_allclose(read.times, t)
+
+
+@pytest.mark.parametrize("days", [("03.09.2024", "04.09.2024"), ("2024-03-09", "2024-03-10")])
+def test_a_date_and_a_time_of_day_are_one_time_over_midnight(tmp_path, days):
+    t, q = sampled(0, 50)
+    lines = [",".join(("date", "time", *JOINTS))]
+    for at, row in zip(t, q.tolist(), strict=True):
+        late = at >= 1
+        clock = f"00:00:{at - 1:06.3f}" if late else f"23:59:{59 + at:06.3f}"
+        lines.append(",".join((days[int(late)], clock, *map(repr, row))))
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    (read,) = read_recordings(tmp_path / "log.csv")
+    np.testing.assert_allclose(read.times, t, atol=1e-6)
+    assert read.names == JOINTS

@@ -43,6 +43,7 @@ from prior_reinforce.arm.recordings.table_times import (
     named_column,
     said_above,
     time_columns,
+    with_whole_dates,
 )
 from prior_reinforce.arm.recordings.tables import Table, read_table
 from prior_reinforce.arm.recordings.units import (
@@ -86,6 +87,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             yield path.stem, unread
             continue
         table = headed(read_table(path, options.delimiter, options.decimal), options.joints)
+        table = with_whole_dates(table)
         said = said_above(path)
         if not table.names or len(table) < 2:
             raise FileFormatError(

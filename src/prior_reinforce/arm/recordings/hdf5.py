@@ -2,7 +2,7 @@
 
 robomimic (0.3, scripts/dataset_states_to_obs.py): `data/demo_k/...` with the rate in the JSON
 attribute `env_args` of `data` where robosuite made it. ManiSkill: `traj_k/...` at the top. ALOHA:
-one episode a file, with `observations/qpos`.
+one episode a file, with `observations/qpos`. An array a joint is taken by its path, `joints/elbow`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 from prior_reinforce.arm.recordings.beside import may_move, recorded_among
 from prior_reinforce.arm.recordings.bounds import MOST_COLUMNS, check_numbers
 from prior_reinforce.arm.recordings.clock import Stamps
-from prior_reinforce.arm.recordings.naming import said_in
+from prior_reinforce.arm.recordings.naming import find_channels, said_in
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     Episodes,
@@ -64,6 +64,8 @@ def _demo(
     with named_damage(path, "HDF5"):
         group = _own(path, top, within)
         keys = options.key or tuple(k for k in _KEYS if _own(path, group, k) is not None)[:1]
+        single = [name for name, shape in _shapes(group).items() if len(shape) == 1]
+        keys = keys or tuple(single[i] for i in find_channels(options.joints or (), single) or ())
         keys = keys or _KEYS[:1]
         key = keys[0]
         arrays = {name: _motion(path, group, name) for name in keys}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -41,6 +42,7 @@ _TIMES = (
     "t", "time", "times", "timestamp", "timestamps", "stamp", "elapsed", "elapsed_time", "duration",
     "datetime", "date",
 )  # fmt: skip
+_DATES = ("date", "datum", "day", "fecha", "data")
 FEWEST_COUNTS = 20
 """Rows of which it can be said that a column counts them. Ours."""
 _MOST_COMMENTS = 200
@@ -80,6 +82,19 @@ def _declared(table: Table, said: dict[str, float], options: ReadOptions) -> dic
             f"--rate {rate:g}; drop --rate, or correct that comment"
         )
     return found
+
+
+def with_whole_dates(table: Table) -> Table:
+    """Return a table whose columns of dates and of times of day are one: `09.03.2024 23:58:00`."""
+    found = {name.lower(): i for i, name in enumerate(table.names) if table.named}
+    date, time = (next((found[n] for n in own if n in found), None) for own in (_DATES, _TIMES))
+    if date is None or time is None or not (table.is_text(date) and table.is_text(time)):
+        return table
+    both = [" ".join(each) for each in zip(table.cells[date], table.cells[time], strict=True)]
+    cells = [both if i == time else own for i, own in enumerate(table.cells) if i != date]
+    names, units = ([*own[:date], *own[date + 1 :]] for own in (table.names, table.units))
+    whole = replace(table, names=tuple(names), units=tuple(units), cells=tuple(cells))
+    return table if whole.nanoseconds(names.index(table.names[time])) is None else whole
 
 
 def called_times(table: Table, options: ReadOptions) -> list[int]:
