@@ -156,6 +156,14 @@ def test_a_place_on_the_first_axis_is_turned_about_by_that_joint():
             assert isinstance(found.moves[1], kind)
 
 
+def test_ranges_are_those_of_the_joints_that_are_turned():
+    ranges = [(-2.9, 2.9), *[(-1.0, 1.0)] * 6]
+    turn = declare_symmetry(JOINTS, 2, about="base", ranges=ranges, **ARM).moves[1]
+    assert turn == TurnJoint(1, 1.0, range=(-2.9, 2.9))
+    path = declare_symmetry(JOINTS, 2, about=(0.43, 0.0), ranges=ranges, **ARM).moves[1]
+    assert path.ranges == tuple(ranges)
+
+
 def test_all_but_the_bearing_may_be_left_to_the_demonstrations():
     symmetry = declare_symmetry(JOINTS, 3, about="base", distance="learned", **ARM)
     assert kinds(symmetry) == [Learned, TurnJoint, Learned]

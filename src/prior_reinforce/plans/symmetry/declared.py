@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from msgspec import UNSET
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.kinematics import UPRIGHT, Chain, first_axis, leaning
@@ -55,6 +56,7 @@ def declare_symmetry(
     distance: Distance = "tempo",
     chain: Chain | None = None,
     joints: Sequence[int] = (),
+    ranges: Sequence[tuple[float, float]] = (),
     start: tuple[float, float] = (0.0, 0.0),
     release_frame: float | None = None,
     steps: Sequence[str] = (),
@@ -70,6 +72,7 @@ def declare_symmetry(
             with every further component of the outcome.
         chain: The arm, where plans are of its joints; its base frame is the outcomes'.
         joints: Columns of the chain's joints, in its order.
+        ranges: Their ends, [rad]; turned plans go the other way round where that fits alone.
         start: (x, y) of the hand before increments, [m].
         release_frame: Where a clock lets go, and not the motion.
         steps: Names of grippers and triggers.
@@ -129,10 +132,11 @@ def declare_symmetry(
     centre = (0.0, 0.0) if about == "base" else (float(about[0]), float(about[1]))
     if chain is not None and joints:
         if about != "base" and not _on_first_axis(chain, centre):
-            path = TurnPath(chain, centre, tuple(joints))
+            path = TurnPath(chain, centre, tuple(joints), tuple(ranges) or UNSET)
             return turn_and_scale(path, centre, scale, others)
         gain, centre = _first_joint(chain)
-        return turn_and_scale(TurnJoint(joints[0], gain), centre, scale, others)
+        first = TurnJoint(joints[0], gain, range=ranges[0] if ranges else UNSET)
+        return turn_and_scale(first, centre, scale, others)
     if place := _columns(column, ("x", "y")):
         vector, quaternion = _columns(column, _VECTOR), _columns(column, _QUATERNION)
         for group in euler_angles(form.names, form.units):
