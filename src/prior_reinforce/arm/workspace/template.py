@@ -35,7 +35,8 @@ class NewWorkspace:
     tip: str | None = None
     """Link of the URDF that is the flange; tool0, flange or the last that turns if not given."""
     base: str | None = None
-    """Link of the URDF that is the base frame, for instance above a lift; its root if not given."""
+    """Link of the URDF at which the base frame stands, for instance above a lift, upright as its
+    root is; the root if not given."""
     hold: tuple[str, ...] = ()
     """Joints of the URDF that stand still, and where, in [rad] or [m]: lift=0.2."""
     action_names: tuple[str, ...] | None = None
