@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.arm.robots import robot_limits
-from prior_reinforce.arm.robots.urdf import read_urdf
+from prior_reinforce.arm.robots.urdf import bases_on_axis, read_urdf
 from prior_reinforce.errors import ConfigurationError, FileFormatError, UnclearFlangeError
 from prior_reinforce.plans.kinematics import rotation, tool_tip
 from tests.arm.robots.arms import UR, limit, ur5e, write_urdf
@@ -309,3 +309,14 @@ def test_a_base_link_stands_upright_in_its_heading_however_it_is_mounted(
     tilted = abs(rpy[0]) + abs(rpy[1]) > 0.1
     assert ("from base (z as in world) to" in above.source) == tilted
     assert tilted or "from base to" in above.source
+
+
+def test_bases_are_links_by_which_the_first_axis_passes(tmp_path):
+    level = {"rpy": (0.0, 0.0, 0.0)}
+    mount = fixed("mount", "base", xyz=(0.5, -0.3, 0.8), **level)
+    riser = fixed("riser", "plate", xyz=(0.0, 0.0, 0.2), rpy=(0.0, 0.0, 1.0))  # other axes
+    joints = [mount, riser, *arm(["a", "b"], xyz=(0.0, 0.0, 0.1), **level)]
+    path = tmp_path / "arm.urdf"
+    path.write_text(Urdf("mounted", joints, root="world").text())
+    assert bases_on_axis(path, None, None, {}, 0.001) == ("world", ["base"])
+    assert bases_on_axis(path, None, "base", {}, 0.001) == ("base", [])

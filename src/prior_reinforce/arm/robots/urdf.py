@@ -21,6 +21,8 @@ _TIPS = ("tool0", "flange", "link_eef")
 _PREFIXED_TIPS = tuple(f"_{tip}" for tip in _TIPS)
 _ROUNDING = 1e-9
 """What is left of a level link's z beside the root's by rounding, [1] (ours)."""
+_SAME_AXES = 0.01
+"""By how much axes of two frames may differ and be called the same, [rad] (ours): 1 cm in 1 m."""
 _FLAT = 0.5
 """Least level part of a link's x that is a heading, [1]. Ours: within 60 degrees of level; of a
 mount that is calibrated to a degree it then turns by 2 degrees at most."""
@@ -101,6 +103,35 @@ def read_urdf(
         chain=kinematics,
         held=hold,
     )
+
+
+def bases_on_axis(
+    path: Path,
+    tip: str | None,
+    base: str | None,
+    hold: Mapping[str, float],
+    within: float,
+) -> tuple[str, list[str]]:
+    """Return the base link, and others by which the first joint's axis passes within [m].
+
+    These stand still against the base link, and their frames have the same axes, so that each may
+    be the `base` of `read_urdf` instead.
+    """
+    _, joints, links, _ = read_joints(path)
+    arm, moving = read_urdf(path, tip, base, hold), {joint.child: joint for joint in joints}
+    first = next(joint for joint in joints if joint.name == arm.joint_names[0])
+    found = list[str]()
+    for joint in _path(first.parent, moving, base):
+        x, y, _, *turned = _first_origin(read_urdf(path, tip, joint.child, hold))
+        same = np.allclose(turned, _first_origin(arm)[3:], atol=_SAME_AXES)
+        if same and math.hypot(x, y) <= within:
+            found.append(joint.child)
+    return base or links[0], found
+
+
+def _first_origin(arm: RobotLimits) -> Pose:
+    assert arm.chain is not None  # a URDF has one
+    return arm.chain.origins[0]
 
 
 def _path(link: str, moving: Mapping[str, Joint], base: str | None = None) -> list[Joint]:
