@@ -5,9 +5,11 @@ import json
 import numpy as np
 import pytest
 
+from prior_reinforce.arm.robots.urdf import read_urdf
 from prior_reinforce.arm.workspace.workspace import Workspace
+from prior_reinforce.plans.kinematics import tool_tip
 from tests.arm.robots.arms import UR, ur5e, write_urdf
-from tests.arm.robots.descriptions import J, Urdf, arm
+from tests.arm.robots.descriptions import J, Urdf, arm, fixed
 
 
 @pytest.mark.slow
@@ -150,23 +152,75 @@ def test_a_joint_is_held_somewhere(run, tmp_path, held):
     assert "lift=0.2" in err
 
 
-@pytest.mark.parametrize(("beside", "warned"), [("0.5 -0.3 0.8", True), ("0.03 0 0.8", False)])
-def test_new_says_where_an_arm_stands_beside_its_descriptions_origin(run, tmp_path, beside, warned):
-    joint = (
-        '<joint name="{}" type="{}"><origin xyz="{}" rpy="0 0 0"/><parent link="{}"/>'
-        '<child link="{}"/><axis xyz="{}"/><limit lower="-3" upper="3" velocity="3"/></joint>'
-    )
-    links = ["world", "base", "one", "tool0"]
-    parts = [
-        joint.format("fixed", "fixed", beside, "world", "base", "0 0 1"),
-        joint.format("turn", "revolute", "0 0 0.2", "base", "one", "0 0 1"),
-        joint.format("lift", "revolute", "0 0 0.2", "one", "tool0", "0 1 0"),
-    ]
+def mounted(tmp_path, xyz, rpy=(0.0, 0.0, 0.0), lift=False):
+    """An arm on a mount, which may be on a lift; its first joint turns about the mount's z."""
+    level, up = (0.0, 0.0, 0.0), (0.0, 0.0, 0.2)
+    joints = [J("lift", "carriage", "prismatic", xyz=level, rpy=level)] * lift
+    joints += [fixed("mount", "base", xyz=xyz, rpy=rpy)]
+    joints += [J("turn", "one", xyz=up, rpy=level)]
+    joints += [J("bend", "tool0", xyz=up, rpy=level, axis=(0.0, 1.0, 0.0))]
     path = tmp_path / "arm.urdf"
-    shown = "".join(f'<link name="{name}"/>' for name in links)
-    path.write_text(f'<robot name="arm">{shown}{"".join(parts)}</robot>')
-    _, out, _ = run("new", tmp_path / "w", "--robot", path, "--symmetry", "carried", "--no-box")
-    assert ("WARNING: turn turns about a place (0.50, -0.30) m" in out) == warned
+    path.write_text(Urdf("mounted", joints, root="world").text())
+    return path
+
+
+@pytest.mark.parametrize(
+    ("xyz", "rpy", "warned"),
+    [
+        ((0.5, -0.3, 0.8), (0.0, 0.0, 0.0), True),
+        ((0.3, -0.2, 1.8), (np.pi, 0.0, 0.0), True),
+        ((0.0, 0.1, 0.8), (0.0, 0.0, 0.0), True),  # 20 cm over half a turn
+        ((0.005, 0.0, 0.8), (0.0, 0.0, 0.0), False),  # 1 cm of 1.5 cm
+    ],
+)
+def test_new_says_where_an_arm_turns_if_that_matters_and_how_to_measure_from_there(
+    run, tmp_path, xyz, rpy, warned
+):
+    path = mounted(tmp_path, xyz, rpy)
+    new = ("--robot", path, "--symmetry", "carried", "--no-box")
+    _, out, _ = run("new", tmp_path / "w", *new)
+    place = f"({xyz[0]:.3f}, {xyz[1]:.3f}) m"
+    assert (f"WARNING: turn turns about {place} in the frame at world" in out) == warned
+    assert (f"add {place} to them, or make the workspace with --base base (" in out) == warned
+    if warned:
+        status, out, _ = run("new", tmp_path / "v", *new, "--base", "base")
+        assert status == 0
+        assert "WARNING" not in out
+        with Workspace(tmp_path / "v") as workspace:  # heading and height as the file has them
+            chain = workspace.manifest.robot.chain
+        q = np.array([0.3, 1.0])
+        seen = tool_tip(read_urdf(path).chain, q) - xyz
+        np.testing.assert_allclose(tool_tip(chain, q), seen, atol=1e-9)
+
+
+def test_above_a_lift_no_link_is_advised_where_none_stands_on_the_axis(run, tmp_path):
+    path = mounted(tmp_path, (0.2, 0.0, 0.1), (0.0, 0.0, 1.0), lift=True)
+    new = ("--robot", path, "--symmetry", "carried", "--no-box", "--base", "carriage")
+    _, out, _ = run("new", tmp_path / "w", *new)
+    assert "about (0.200, 0.000) m in the frame at carriage" in out
+    assert "--base" not in out
+
+
+@pytest.mark.parametrize("how", [("--symmetry", "none"), ("--symmetry", "0.5 0", "--no-box")])
+def test_of_an_axis_that_is_level_no_place_is_said(run, tmp_path, how):
+    path = mounted(tmp_path, (0.2, 0.0, 0.1), (0.0, np.pi / 2, 0.0))
+    status, out, _ = run("new", tmp_path / "w", "--robot", path, *how, "--base", "base")
+    assert status == 0
+    assert "turns about (" not in out
+    status, _, err = run(
+        "new", tmp_path / "v", "--robot", path, "--symmetry", "carried", "--no-box"
+    )
+    assert status == 2
+    assert "leans by 90 degrees from the vertical" in err
+
+
+@pytest.mark.parametrize(("lean", "warned"), [(0.01, False), (0.045, True)])
+def test_a_lean_is_said_where_it_matters(run, tmp_path, lean, warned):
+    path = mounted(tmp_path, (0.0, 0.0, 0.0), (lean, 0.0, 0.0))
+    path.write_text(path.read_text().replace("0 0 0.2", "0 0 0.6"))
+    new = ("--robot", path, "--symmetry", "carried", "--no-box", "--tolerance", "0.02")
+    _, out, _ = run("new", tmp_path / "w", *new)
+    assert ("the axis of turn leans by 2.6 degrees" in out) == warned
 
 
 def test_where_the_person_at_the_terminal_gives_no_answer_nothing_is_made(

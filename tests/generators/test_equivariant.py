@@ -171,3 +171,15 @@ def test_every_symmetry_gives_finite_plans_for_goals_around(symmetry, k, n):
     plans = generator.generate(goals)
     assert plans.shape[::2] == (5, 3)
     assert np.all(np.isfinite(plans))
+
+
+def test_motions_that_differ_by_a_whole_turn_of_the_joint_are_mixed_as_one(throws):
+    """Behind the arm, one person's 178 degrees are another's -182."""
+    shown = thrown(throws, 4)
+    behind = turn_and_scale(TurnJoint(2, range=(-2 * np.pi, 2 * np.pi)), scale=Learned())
+    apart = shown.plans + np.pi * np.eye(3)[2]
+    apart[::2, :, 2] -= 2 * np.pi
+    demos = replace(shown, plans=apart, outcomes_seen=-shown.outcomes_seen, symmetry=behind)
+    (plan,) = make_generator("auto").fit(demos, seed=0).generate(-shown.outcomes_seen[:1])
+    off = (plan[0, 2] - apart[0, 0, 2]) / (2 * np.pi)
+    assert off == pytest.approx(round(off), abs=0.02)

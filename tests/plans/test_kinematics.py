@@ -12,8 +12,11 @@ from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.errors import OutOfReachError
 from prior_reinforce.plans.kinematics import (
     Chain,
+    first_axis,
     flange_path,
+    leaning,
     link_places,
+    rotation,
     tool_tip,
     turned_path,
 )
@@ -118,3 +121,29 @@ def test_a_path_beyond_reach_is_refused_with_the_angle_and_the_error():
         OutOfReachError, match=r"out of reach: turned by 1.5 rad about \(0.2, 0.4\)"
     ):
         turned_path(FRANKA, q, 1.5, (0.2, 0.4))
+
+
+def test_what_a_flange_misses_by_a_fraction_of_a_millimetre_is_in_reach():
+    """Five joints on a mount that leans by 3 mrad do not reach the pose exactly."""
+    ur = robot_limits("ur5e").chain
+    mount = (0.0, 0.0, 0.1625, 0.003, 0.0, 0.0)
+    chain = Chain((mount, *ur.origins[1:5]), ur.axes[:5], ur.flange)
+    swing = np.linspace(0, 0.3, 20)[:, None] ** 2 * [0.5, 1.0, 1.0, 0.5, 0.2]
+    q = np.array([0.2, -1.2, 1.6, -1.0, -1.4]) + swing
+    turned = turned_path(chain, q, 0.5, (0.0, 0.0))
+    before, after = flange_path(chain, q), flange_path(chain, turned)
+    turn = rotation(0.0, 0.0, 0.5)
+    left = Rotation.from_matrix(turn @ before.attitudes @ np.swapaxes(after.attitudes, 1, 2))
+    off = np.abs(after.places - before.places @ turn.T).max(), left.magnitude().max()
+    assert off[0] < 5e-4
+    assert 1e-4 < off[1] < 2e-3
+    rough = np.abs(np.diff(turned, n=2, axis=0)).max() / np.abs(np.diff(q, n=2, axis=0)).max()
+    assert rough < 1.1
+
+
+def test_where_the_first_axis_stands_and_leans():
+    chain = Chain(((0.1, -0.2, 0.3, np.pi - 0.02, 0.0, 0.0),), ((0.0, 0.0, 1.0),))
+    along, stands = first_axis(chain)
+    assert stands == (0.1, -0.2)
+    np.testing.assert_allclose(along, [0.0, -np.sin(0.02), -np.cos(0.02)], atol=1e-12)
+    assert leaning(along) == pytest.approx(0.02)

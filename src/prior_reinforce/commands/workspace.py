@@ -15,8 +15,10 @@ import tyro
 from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
 from prior_reinforce.arm.robots import RobotLimits
 from prior_reinforce.arm.robots.presets import PRESETS
+from prior_reinforce.arm.robots.urdf import bases_on_axis
 from prior_reinforce.arm.workspace.declared import WAYS, read_object
 from prior_reinforce.arm.workspace.folder import require_new
+from prior_reinforce.arm.workspace.manifest import Manifest
 from prior_reinforce.arm.workspace.template import NewWorkspace
 from prior_reinforce.arm.workspace.view import trials_table
 from prior_reinforce.arm.workspace.workspace import Workspace
@@ -24,11 +26,9 @@ from prior_reinforce.commands.base import Json, OnWorkspace, Words, print_json, 
 from prior_reinforce.commands.questions import answer_to
 from prior_reinforce.errors import ConfigurationError, UnclearFlangeError
 from prior_reinforce.files import named_disk_errors
+from prior_reinforce.plans.kinematics import UPRIGHT, first_axis, leaning
+from prior_reinforce.units import UNITS
 from prior_reinforce.wording import say_place, say_tolerance
-
-_BESIDE = 0.1
-"""How far from its frame's origin an arm's first axis may be without a word, in [m]. Ours: of small
-arms it is off by a few centimetres."""
 
 AdapterChoice = Annotated[
     str, tyro.conf.arg(help=f"How the condition is corrected: {ADAPTERS.help}.")
@@ -78,7 +78,8 @@ class New(NewWorkspace):
                 if moved.distance != "learned":
                     enough = "one demonstration is enough"
                 print(f"symmetry: {WAYS[where]}; {enough}, see docs/symmetry.md")
-                print_beside_base(workspace.manifest.robot)
+                if moved.turns:
+                    asked._print_first_axis(workspace.manifest)
             print_next(workspace)
 
     def _with_flange(self) -> New:
@@ -123,6 +124,39 @@ class New(NewWorkspace):
             raise ConfigurationError(f"six numbers or no box, got {corners!r}") from error
         return replace(asked, box=(low_x, low_y, low_z, x, y, z))
 
+    def _print_first_axis(self, manifest: Manifest) -> None:
+        """Say where the arm's first axis stands, and leans, if turns could miss goals by it."""
+        robot, form = manifest.robot, manifest.outcome_format
+        if robot is None or robot.chain is None:
+            return
+        along, (x, y) = first_axis(robot.chain)
+        lean, off, joint = leaning(along), math.hypot(x, y), robot.joint_names[0]
+        if lean > UPRIGHT:
+            return  # it turns about no place
+        within = min(
+            epsilon * (UNITS[unit].factor if unit in UNITS else 1.0)
+            for epsilon, unit in zip(form.tolerance[:2], form.units, strict=False)
+        )
+        if 2.0 * off > within:  # half a turn about the one place or the other
+            path, at = Path(self.robot), f"({round(x, 3) + 0.0:.3f}, {round(y, 3) + 0.0:.3f}) m"
+            frame, bases = bases_on_axis(path, self.tip, self.base, self.held(), within / 2.0)
+            remedy = f"add {at} to them"
+            remedy += f", or make the workspace with --base {bases[0]}" if bases else ""
+            print(
+                f"WARNING: {joint} turns about {at} in the frame at {frame}, and outcomes, goals "
+                f"and the box are understood there; if yours are measured from that axis, {remedy} "
+                f"(turned motions would else be off by up to {2.0 * off:.3f} m)"
+            )
+        ends = [*robot.chain.origins[1:], robot.chain.flange]
+        reach = sum(math.hypot(*end[:3]) for end in ends)
+        if lean * reach > within:
+            print(
+                f"WARNING: the axis of {joint} leans by {math.degrees(lean):.1f} degrees from the "
+                f"vertical: a motion turned by it is off by up to {lean * reach:.3f} m for each "
+                f"radian at the arm's full length ({reach:.2f} m), which trials correct; where the "
+                "lean is none of the real arm's, mend the URDF"
+            )
+
 
 def _say_robot(robot: RobotLimits) -> str:
     said = f"robot {robot.robot}: {', '.join(robot.joint_names)}; limits from {robot.source}"
@@ -133,19 +167,6 @@ def _say_robot(robot: RobotLimits) -> str:
         f"{said}; no limits of {' and '.join(unknown)} are known: plans are compared with the "
         "demonstrations in these"
     )
-
-
-def print_beside_base(robot: RobotLimits | None) -> None:
-    """Say so where the arm's first joint turns far from the origin of its description's frame."""
-    if robot is None or robot.chain is None:
-        return
-    x, y, *_ = robot.chain.origins[0]
-    if math.hypot(x, y) > _BESIDE:
-        print(
-            f"WARNING: {robot.joint_names[0]} turns about a place ({x:.2f}, {y:.2f}) m from the "
-            "origin of the description's root link, and places are understood from there; if "
-            "yours are measured from the arm's own base, make the workspace with --base LINK"
-        )
 
 
 def print_goal(workspace: Workspace) -> None:

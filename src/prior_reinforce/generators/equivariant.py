@@ -87,7 +87,9 @@ class Equivariant(Wrapper):
         """Plans at home, with what is left of their outcomes."""
         symmetry, left, z = anchors.symmetry, anchors.left, anchors.z
         to_home = np.where(symmetry.exact, self._home - z, 0.0)
-        plans = [symmetry.move(*each) for each in zip(demonstrations.plans, to_home, strict=True)]
+        move, shown = symmetry.endless.move, demonstrations.plans
+        plans = [move(*each) for each in zip(shown, to_home, strict=True)]
+        plans = [symmetry.toward(plan, plans[0]) for plan in plans]
         into = np.linalg.inv(symmetry.chart.jacobian(z))
         correction = np.einsum("nij,nj->ni", into, demonstrations.outcome_correction)
         names = demonstrations.outcome_format.names
@@ -120,6 +122,7 @@ class Equivariant(Wrapper):
         assert self._anchors is not None
         count = np.flatnonzero(weights)
         moved = [self._to(self._plans[i], aim, self._anchors.z[i]) for i in count]
+        moved = [self._anchors.symmetry.toward(plan, moved[0]) for plan in moved]
         return (
             moved[0]
             if len(count) == 1

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from prior_reinforce.arm.robots import robot_limits
-from prior_reinforce.arm.robots.urdf import read_urdf
+from prior_reinforce.arm.robots.urdf import bases_on_axis, read_urdf
 from prior_reinforce.errors import ConfigurationError, FileFormatError, UnclearFlangeError
-from prior_reinforce.plans.kinematics import tool_tip
+from prior_reinforce.plans.kinematics import rotation, tool_tip
 from tests.arm.robots.arms import UR, limit, ur5e, write_urdf
+from tests.arm.robots.descriptions import J, Urdf, arm, fixed
 
 TIP = (0.03, -0.02, 0.15)
 
@@ -275,3 +276,47 @@ def test_a_joint_that_turns_the_gripper_is_the_arms(tmp_path):
     names = ["base_rotation", "shoulder", "elbow", "wrist_pitch", "gripper_rotation"]
     with pytest.raises(UnclearFlangeError, match=r"--tip: part_5, which .* gripper_rotation moves"):
         read_urdf(named_arm(tmp_path, names, "part.stl", behind="part_5"))
+
+
+@pytest.mark.parametrize(
+    ("rpy", "heading"),
+    [
+        ((0.0, 0.0, 0.7), 0.7),  # turned
+        ((np.pi, 0.0, 0.0), 0.0),  # on a ceiling
+        ((np.pi, 0.0, -1.2), -1.2),
+        ((np.pi / 2, 0.0, 0.3), 0.3),  # on a wall, its x level
+        ((0.0, np.pi / 2, 0.4), 0.0),  # on a wall, its x down: the root's axes
+        ((0.0, np.pi / 2 + 0.01, 0.4), 0.0),
+        ((0.01, -0.02, np.pi), np.pi),  # calibrated
+    ],
+)
+@pytest.mark.parametrize("torso", [False, True])
+def test_a_base_link_stands_upright_in_its_heading_however_it_is_mounted(
+    tmp_path, rpy, heading, torso
+):
+    place = (0.3, -0.2, 1.8)
+    lift = J("lift", "lifted", "prismatic", xyz=(0.0, 0.1, 0.0), rpy=(0.0, 0.0, 0.0))
+    joints = [*[lift] * torso, fixed("mount", "base", xyz=place, rpy=rpy), *arm(["a", "b", "c"])]
+    path = tmp_path / "arm.urdf"
+    path.write_text(Urdf("mounted", joints, root="world").text())
+    hold = {"lift": 0.4} if torso else {}
+    whole, above = read_urdf(path, hold=hold), read_urdf(path, base="base")
+    q = np.random.default_rng(0).uniform(-2, 2, (5, 3))
+    stands = np.add(place, (0.0, 0.1, 0.4) if torso else 0.0)
+    expected = tool_tip(whole.chain, q, TIP) - stands
+    turn = rotation(0.0, 0.0, heading)
+    np.testing.assert_allclose(tool_tip(above.chain, q, TIP) @ turn.T, expected, atol=2e-4)
+    tilted = abs(rpy[0]) + abs(rpy[1]) > 0.1
+    assert ("from base (z as in world) to" in above.source) == tilted
+    assert tilted or "from base to" in above.source
+
+
+def test_bases_are_links_by_which_the_first_axis_passes(tmp_path):
+    level = {"rpy": (0.0, 0.0, 0.0)}
+    mount = fixed("mount", "base", xyz=(0.5, -0.3, 0.8), **level)
+    riser = fixed("riser", "plate", xyz=(0.0, 0.0, 0.2), rpy=(0.0, 0.0, 1.0))  # other axes
+    joints = [mount, riser, *arm(["a", "b"], xyz=(0.0, 0.0, 0.1), **level)]
+    path = tmp_path / "arm.urdf"
+    path.write_text(Urdf("mounted", joints, root="world").text())
+    assert bases_on_axis(path, None, None, {}, 0.001) == ("world", ["base"])
+    assert bases_on_axis(path, None, "base", {}, 0.001) == ("base", [])

@@ -18,7 +18,9 @@ SEVEN = [f"joint_{i}" for i in range(1, 8)]
 SIX = [f"joint{i}" for i in range(1, 7)]
 SO = ["shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll"]
 WX = ["waist", "shoulder", "elbow", "wrist_angle", "wrist_rotate"]
-LIFT = J("torso_lift_joint", "torso_lift_link", "prismatic", low=0.0, high=0.4, speed=0.1)
+YAWED = {"rpy": (0.0, 0.0, -0.2)}
+"""What a base link above may be against the root without another base frame (`test_urdf`)."""
+LIFT = J("torso_lift_joint", "torso_lift_link", "prismatic", low=0.0, high=0.4, speed=0.1, **YAWED)
 SOFT = (
     '<safety_controller soft_lower_limit="-2" soft_upper_limit="2" k_position="9" k_velocity="9"/>'
 )
@@ -155,7 +157,11 @@ READ = [
     ),
     Urdf(
         "an arm on a rail",
-        [J("rail", "carriage", "prismatic", low=0.0, high=3.0), *arm(UR), fixed("t", "tool0")],
+        [
+            J("rail", "carriage", "prismatic", low=0.0, high=3.0, **YAWED),
+            *arm(UR),
+            fixed("t", "tool0"),
+        ],
         {"base": "carriage"},
     ),
     Urdf(
@@ -170,7 +176,7 @@ READ = [
     ),
     Urdf(
         "a planar base",
-        [J("drive", "chassis", "planar"), *arm(SIX)],
+        [J("drive", "chassis", "planar", **YAWED), *arm(SIX)],
         {"base": "chassis"},
         root="odom",
     ),

@@ -7,12 +7,14 @@ import pytest
 
 import prior_reinforce as pr
 from prior_reinforce.arm.workspace.declared import read_object
+from prior_reinforce.arm.workspace.reaching import region_of
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.errors import (
     ConfigurationError,
     InvalidDemonstrationsError,
     OutOfReachError,
 )
+from prior_reinforce.plans.kinematics import rotation
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.symmetry import Shift, TurnJoint, TurnPath
@@ -148,3 +150,32 @@ def test_nothing_is_declared_where_nothing_was_said(tmp_path):
         assert workspace.manifest.symmetry is None
     with Workspace.create(tmp_path / "other", symmetry="none") as workspace:
         assert workspace.manifest.symmetry is None
+
+
+def test_a_goal_behind_is_reached_the_other_way_round_where_the_first_joint_allows(tmp_path):
+    """The Panda's first joint, at 1.2 rad, has 1.7 rad to its end and 4.1 rad to the other."""
+    own = shown([0])
+    first = own.format.names.index("joint1")
+    plans = own.plans + (1.2 - own.plans[0, 0, first]) * np.eye(own.plans.shape[2])[first]
+    with Workspace.create(tmp_path / "hoop", symmetry="carried", no_box=True) as hoop:
+        hoop.import_demonstrations(replace(own, plans=plans), "a throw")
+        hoop.learn()
+        assert region_of(hoop).reached.any(axis=0).sum() == 12  # of 13 bearings: 28 deg are missing
+        place = own.outcomes_seen[0] @ rotation(0.0, 0.0, 2.6)[:2, :2].T
+        hoop.set_goal(place)
+        trial = hoop.session().ask()
+        assert not trial.verdict.refused
+        turned = (trial.plan - plans[0])[:, first]
+        np.testing.assert_allclose(turned, 2.6 - 2 * np.pi, atol=1e-6)
+
+
+def test_a_range_that_is_narrowed_between_trials_asks_for_no_learning_and_learning_takes_it(hoop):
+    hoop.import_demonstrations(shown([0]), "a throw")
+    before = hoop.demonstrations.symmetry.moves[1].range
+    hoop.manifest = replace(
+        hoop.manifest, robot=replace(hoop.manifest.robot, upper=hoop.manifest.robot.upper - 0.1)
+    )
+    assert hoop.demonstrations.symmetry.moves[1].range == before
+    hoop.learn()
+    after = hoop.demonstrations.symmetry.moves[1].range
+    assert after == (before[0], pytest.approx(before[1] - 0.1))

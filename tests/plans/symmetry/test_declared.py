@@ -7,7 +7,7 @@ import pytest
 
 from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.plans.kinematics import Chain, tool_tip
+from prior_reinforce.plans.kinematics import Chain, rotation, tool_tip
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.symmetry import (
     Amplitude,
@@ -114,8 +114,54 @@ def test_what_cannot_be_done_is_refused_by_name(form, k, said, message):
 def test_an_arm_on_a_wall_has_no_upright_base():
     wall = Chain(((0, 0, 0, np.pi / 2, 0, 0),) * 2, ((0.0, 0.0, 1.0),) * 2)
     form = PlanFormat(("a", "b"), ("rad", "rad"), 0.01)
-    with pytest.raises(ConfigurationError, match="not vertical"):
+    with pytest.raises(ConfigurationError, match=r"leans by 90 degrees .* --symmetry"):
         declare_symmetry(form, 2, about="base", chain=wall, joints=(0, 1))
+
+
+def leaning(by):
+    """The UR5e on a mount that leans about x."""
+    chain = robot_limits("ur5e").chain
+    return replace(chain, origins=((0.0, 0.0, 0.1625, by, 0.0, 0.0), *chain.origins[1:]))
+
+
+UR_FORM = PlanFormat(tuple("abcdef"), ("rad",) * 6, 0.01)
+
+
+@pytest.mark.parametrize("lean", [0.002, 0.01, 0.04, np.pi - 0.01])
+def test_a_mount_that_leans_a_little_is_turned_by_its_first_joint(lean):
+    chain = leaning(lean)
+    symmetry = declare_symmetry(UR_FORM, 2, about="base", chain=chain, joints=range(6))
+    assert symmetry.moves[1] == TurnJoint(0, 1.0 if lean < 1 else -1.0)
+    plan = np.tile([0.2, -1.0, 1.5, -1.0, -1.5, 0.3], (3, 1))
+    moved = symmetry.move(plan, np.array([0.0, 0.35]))
+    turn = rotation(0.0, 0.0, 0.35)
+    off = tool_tip(chain, moved) - tool_tip(chain, plan) @ turn.T
+    reach = 1.3
+    assert np.linalg.norm(off, axis=1).max() < min(lean, np.pi - lean) * reach * 0.35
+
+
+@pytest.mark.parametrize("lean", [0.06, np.pi - 0.06])
+def test_a_mount_that_leans_by_more_is_refused(lean):
+    with pytest.raises(ConfigurationError, match=r"leans by 3 degrees"):
+        declare_symmetry(UR_FORM, 2, about="base", chain=leaning(lean), joints=range(6))
+
+
+def test_a_place_on_the_first_axis_is_turned_about_by_that_joint():
+    """Inverse kinematics would have to be exact where a wrist is singular."""
+    for chain, place in ((UPSIDE_DOWN, (0.1, 0.2)), (leaning(0.01), (0.0, 0.0016))):
+        n = len(chain.axes)
+        form = PlanFormat(tuple(f"j{i}" for i in range(n)), ("rad",) * n, 0.01)
+        for about, kind in ((place, TurnJoint), ((place[0] + 0.1, place[1]), TurnPath)):
+            found = declare_symmetry(form, 2, about=about, chain=chain, joints=range(n))
+            assert isinstance(found.moves[1], kind)
+
+
+def test_ranges_are_those_of_the_joints_that_are_turned():
+    ranges = [(-2.9, 2.9), *[(-1.0, 1.0)] * 6]
+    turn = declare_symmetry(JOINTS, 2, about="base", ranges=ranges, **ARM).moves[1]
+    assert turn == TurnJoint(1, 1.0, range=(-2.9, 2.9))
+    path = declare_symmetry(JOINTS, 2, about=(0.43, 0.0), ranges=ranges, **ARM).moves[1]
+    assert path.ranges == tuple(ranges)
 
 
 def test_all_but_the_bearing_may_be_left_to_the_demonstrations():

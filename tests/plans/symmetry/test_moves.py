@@ -181,3 +181,38 @@ def test_a_path_turns_about_a_point_and_held_joints_stay_held():
         np.testing.assert_allclose(tool_tip(CHAIN, moved, tip), expected, atol=1e-5)
     np.testing.assert_array_equal(moved[:, 2], plan[:, 2])
     assert np.abs(np.diff(moved - plan, axis=0)).max() < 0.02
+
+
+@pytest.mark.parametrize(
+    ("ends", "start", "amount", "ends_at"),
+    [
+        ((0.01, 5.84), 1.2, -2.5, 1.2 - 2.5 + 2 * np.pi),  # the youBot's: not centred
+        ((-2.9, 2.9), 1.2, 2.6, 1.2 + 2.6 - 2 * np.pi),
+        ((-2.9, 2.9), 1.2, 1.0, 2.2),  # as it is
+        ((-6.3, 6.3), 6.0, 1.0, 7.0 - 2 * np.pi),  # nearest of several: not two turns
+        ((-1.0, 2.9), 1.2, 2.6, 3.8),  # neither way: the gate says by how much
+    ],
+)
+@pytest.mark.parametrize("gain", [1.0, -1.0])
+def test_a_turn_goes_the_other_way_round_where_that_alone_is_within_the_joints_range(
+    ends, start, amount, ends_at, gain
+):
+    plan = np.zeros((5, 2))
+    plan[:, 1] = start + np.linspace(0, 0.2, 5) - 0.1
+    move = TurnJoint(1, gain, range=(ends[0] - 0.1, ends[1] + 0.1))
+    moved = move(plan, gain * amount)
+    np.testing.assert_allclose(moved[:, 1] - plan[:, 1], ends_at - start, atol=1e-12)
+    np.testing.assert_allclose(np.diff(move.endless(plan, gain * amount)[0]), start + amount - 0.1)
+    np.testing.assert_array_equal(moved[:, 0], 0.0)
+    assert (move.ranged_of(), move.endless.ranged_of()) == ((1,), ())
+
+
+def test_joints_of_a_turned_path_are_brought_into_their_ranges_by_whole_turns():
+    plan = swing()
+    plain = TurnPath(CHAIN, (0.43, 0.0), tuple(range(7)))
+    free = plain(plan, 0.3)
+    ends = [(low - 0.1, high + 0.1) for low, high in zip(free.min(0), free.max(0), strict=True)]
+    ends[0] = (ends[0][0] + 2 * np.pi, ends[0][1] + 2 * np.pi)
+    move = TurnPath(CHAIN, (0.43, 0.0), tuple(range(7)), tuple(ends))
+    np.testing.assert_allclose(move(plan, 0.3), free + 2 * np.pi * np.eye(7)[0])
+    assert move.endless == plain

@@ -60,3 +60,19 @@ def test_increments_are_those_that_its_moves_name():
     assert turn_and_scale(turn, scale=Tempo(increments=(0, 1))).increments == (0, 1, 2)
     assert shift((3, 4), lead=5).increments == (3, 4)
     assert shift().increments == ()
+
+
+def test_ranges_are_data_and_nothing_is_said_where_they_are_not_known():
+    plain, known = turn_and_scale(TurnJoint()), turn_and_scale(TurnJoint(range=(-2.0, 3.0)))
+    assert set(plain.data()["moves"][1]) == {"type", "joint", "gain", "ramp"}
+    assert Symmetry.from_data(json.loads(json.dumps(known.data()))) == known
+    assert known != plain
+    assert known.endless == plain
+
+
+def test_a_motion_by_a_whole_turn_more_is_brought_to_where_another_is():
+    near, moved = np.full((4, 2), 3.0), np.full((5, 2), -3.1)
+    known = turn_and_scale(TurnJoint(1, range=(-6.0, 6.0)))
+    brought = known.toward(moved, near)
+    np.testing.assert_allclose(brought, [-3.1, 2 * np.pi - 3.1] * np.ones((5, 2)))
+    np.testing.assert_array_equal(known.endless.toward(moved, near), moved)

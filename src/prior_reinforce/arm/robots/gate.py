@@ -127,7 +127,7 @@ def check_plan(
     columns = match_joints(plan.format, limits)
     moved, speed = shown, None
     if demonstrations is not None and demonstrations.symmetry is not None and condition is not None:
-        moved, speed = _moved(demonstrations, condition)
+        moved, speed = _moved(demonstrations, condition, plan)
     lines = [_joints(plan, limits, columns, settings.absent_joints)]
     with np.errstate(all="ignore"):  # what is no number refuses
         if columns:
@@ -348,17 +348,20 @@ def _narrowest(bound: Samples) -> Samples:
     return np.minimum(np.minimum(padded[:-2], padded[2:]), bound)
 
 
-def _moved(demonstrations: Demonstrations, condition: Point) -> tuple[list[Plan], float]:
-    """Demonstrations as a generator moves them to a condition, and how much faster they are."""
+def _moved(
+    demonstrations: Demonstrations, condition: Point, plan: Plan
+) -> tuple[list[Plan], float]:
+    """Demonstrations as a generator moves them to a plan's condition, and how much faster."""
     symmetry = demonstrations.symmetry
     assert symmetry is not None
     anchors = Anchors(symmetry, demonstrations.outcomes_seen, demonstrations.outcome_noise)
     each, w = anchors.moves(symmetry.chart.to(condition))
     moved = list[Plan]()
-    for plan, by in zip(demonstrations.plans, each, strict=True):
+    for shown, by in zip(demonstrations.plans, each, strict=True):
         with suppress(OutOfReachError):  # a mixture with others may be in reach
             if np.all(np.isfinite(by)):
-                moved.append(Plan(symmetry.move(plan, by), demonstrations.format))
+                frames = symmetry.toward(symmetry.endless.move(shown, by), plan.actions)
+                moved.append(Plan(frames, demonstrations.format))
     return moved, symmetry.speed(w)
 
 

@@ -12,13 +12,20 @@ import numpy as np
 from prior_reinforce.arm.robots.limits import PerJoint, RobotLimits
 from prior_reinforce.arm.robots.urdf_file import RATES, TURNING, TYPES, Joint, read_joints
 from prior_reinforce.errors import ConfigurationError, FileFormatError, UnclearFlangeError
-from prior_reinforce.plans.kinematics import Chain, Pose
+from prior_reinforce.plans.kinematics import UPRIGHT, Chain, Pose, rotation
 
 _MOST_NAMED, _MOST_JOINTS = 40, 100
 """Links in a message, and turning joints of one arm (ours)."""
 _TIPS = ("tool0", "flange", "link_eef")
 """Links that are the flange by ROS's conventions (REP 199) and UFACTORY's; the first there is."""
 _PREFIXED_TIPS = tuple(f"_{tip}" for tip in _TIPS)
+_ROUNDING = 1e-9
+"""What is left of a level link's z beside the root's by rounding, [1] (ours)."""
+_SAME_AXES = 0.01
+"""By how much axes of two frames may differ and be called the same, [rad] (ours): 1 cm in 1 m."""
+_FLAT = 0.5
+"""Least level part of a link's x that is a heading, [1]. Ours: within 60 degrees of level; of a
+mount that is calibrated to a degree it then turns by 2 degrees at most."""
 _JAW = re.compile("grip|jaw|finger|claw|knuckle|thumb|pinch|tong", re.IGNORECASE)
 _JAW_MESH = re.compile("jaw|finger|claw|thumb|pinch", re.IGNORECASE)
 """Of a mesh's file name, which may be the only one that a CAD program's export leaves telling."""
@@ -39,7 +46,8 @@ def read_urdf(
         path: Of a URDF; meshes that it names are not read.
         tip: The link that is the flange; None takes `tool0`, `flange` or `link_eef`, else the link
             that the last turning joint of the longest chain moves.
-        base: The link that is the base frame, for instance above a lift; None takes the root.
+        base: The link at which the base frame stands, for instance above a lift; None takes the
+            root. Its z is the root's, and its x the link's, laid flat; see `_upright`.
         hold: Joints that stand still, and where, in [rad] and [m].
 
     Returns:
@@ -69,11 +77,13 @@ def read_urdf(
         _refuse_other(chain, turning, tip, hold)
         limits = np.array([joint.limits() for joint in turning])
         acceleration, jerk = (_rates(key, turning) for key in RATES)
-        kinematics = _chain(chain, hold)
+        upright = _upright(_path(chain[0].parent, moving), hold)
+        kinematics = _chain(chain, hold, upright)
     except (ConfigurationError, FileFormatError) as error:
         error.args = (f"{path}: {error}",)
         raise
-    source = f"{path.name}, from {chain[0].parent} to {tip}"
+    tilted = bool(upright[2, 2] < math.cos(UPRIGHT))
+    source = f"{path.name}, from {chain[0].parent}{f' (z as in {links[0]})' * tilted} to {tip}"
     source += "".join(f", {name} held at {position:g}" for name, position in hold.items())
     source += ", soft limits too" * any("safety_controller" in joint.parts for joint in turning)
     over = [f"{what} of joint {joint.name}" for joint in joints for what in joint.unknown]
@@ -93,6 +103,35 @@ def read_urdf(
         chain=kinematics,
         held=hold,
     )
+
+
+def bases_on_axis(
+    path: Path,
+    tip: str | None,
+    base: str | None,
+    hold: Mapping[str, float],
+    within: float,
+) -> tuple[str, list[str]]:
+    """Return the base link, and others by which the first joint's axis passes within [m].
+
+    These stand still against the base link, and their frames have the same axes, so that each may
+    be the `base` of `read_urdf` instead.
+    """
+    _, joints, links, _ = read_joints(path)
+    arm, moving = read_urdf(path, tip, base, hold), {joint.child: joint for joint in joints}
+    first = next(joint for joint in joints if joint.name == arm.joint_names[0])
+    found = list[str]()
+    for joint in _path(first.parent, moving, base):
+        x, y, _, *turned = _first_origin(read_urdf(path, tip, joint.child, hold))
+        same = np.allclose(turned, _first_origin(arm)[3:], atol=_SAME_AXES)
+        if same and math.hypot(x, y) <= within:
+            found.append(joint.child)
+    return base or links[0], found
+
+
+def _first_origin(arm: RobotLimits) -> Pose:
+    assert arm.chain is not None  # a URDF has one
+    return arm.chain.origins[0]
 
 
 def _path(link: str, moving: Mapping[str, Joint], base: str | None = None) -> list[Joint]:
@@ -225,11 +264,38 @@ def _rates(key: str, turning: Sequence[Joint]) -> PerJoint | None:
     return np.array(said) if said else None
 
 
-def _chain(joints: Sequence[Joint], hold: Mapping[str, float]) -> Chain:
-    """Origins of the turning joints, with the fixed ones before each taken in."""
+def _upright(before: Sequence[Joint], hold: Mapping[str, float]) -> np.ndarray:
+    """Attitude of a base link in the frame that has its heading and the root's z, 3 x 3.
+
+    So what is vertical, and where a box is high, stays what the file says of a mount on a ceiling
+    or a wall. Where the link's x is steep and so no heading, the frame's axes are the root's.
+
+    Args:
+        before: Joints from the root to the link; those that move are at 0.
+        hold: Joints that stand still, and where.
+    """
+    link = np.eye(3)
+    for joint in before:
+        link = link @ joint.pose(hold.get(joint.name))[:3, :3]
+    if math.hypot(link[0, 2], link[1, 2]) < _ROUNDING and link[2, 2] > 0:
+        return np.eye(3)
+    flat = math.hypot(link[0, 0], link[1, 0])
+    yaw = math.atan2(link[1, 0], link[0, 0]) if flat > _FLAT else 0.0
+    return np.asarray(rotation(0.0, 0.0, -yaw) @ link)
+
+
+def _chain(joints: Sequence[Joint], hold: Mapping[str, float], upright: np.ndarray) -> Chain:
+    """Origins of the turning joints, with the fixed ones before each taken in.
+
+    Args:
+        joints: From the base link to the flange.
+        hold: Joints that stand still, and where.
+        upright: The base link in the base frame.
+    """
     origins: list[Pose] = []
     axes: list[tuple[float, float, float]] = []
     since = np.eye(4)
+    since[:3, :3] = upright
     for joint in joints:
         since = since @ joint.pose(hold.get(joint.name))
         if joint.type in TURNING and joint.name not in hold:

@@ -65,6 +65,9 @@ class DeclaredSymmetry(Struct, frozen=True, forbid_unknown_fields=True):
             distance="shift" if self.object == "anywhere" else self.distance,
             chain=robot.chain if robot is not None and joints else None,
             joints=joints,
+            ranges=[*zip(robot.lower.tolist(), robot.upper.tolist(), strict=True)]
+            if robot is not None and joints
+            else (),
             start=self.start,
             release_frame=self.release_frame,
             steps=self.steps,

@@ -115,12 +115,18 @@ class Manifest:
                 "prior-reinforce learn"
             )
 
-    def agrees(self, demonstrations: Demonstrations) -> bool:
-        """Whether demonstrations carry the symmetry that is declared, where one is."""
-        declared = self.declared(demonstrations.format)
-        return declared is None or demonstrations.symmetry == declared.around(
-            demonstrations.outcomes_seen
-        )
+    def agrees(self, demonstrations: Demonstrations, *, in_range: bool = False) -> bool:
+        """Whether demonstrations carry the symmetry that is declared, where one is.
+
+        Args:
+            demonstrations: That were imported.
+            in_range: Also the joints' ranges of now, which a person may narrow between trials.
+        """
+        declared, carried = self.declared(demonstrations.format), demonstrations.symmetry
+        if declared is None or carried is None:
+            return declared is None
+        declared = declared.around(demonstrations.outcomes_seen)
+        return declared == carried if in_range else declared.endless == carried.endless
 
 
 _Texts = Annotated[tuple[str, ...], Meta(min_length=1)]

@@ -35,7 +35,8 @@ class NewWorkspace:
     tip: str | None = None
     """Link of the URDF that is the flange; tool0, flange or the last that turns if not given."""
     base: str | None = None
-    """Link of the URDF that is the base frame, for instance above a lift; its root if not given."""
+    """Link of the URDF at which the base frame stands, for instance above a lift, upright as its
+    root is; the root if not given."""
     hold: tuple[str, ...] = ()
     """Joints of the URDF that stand still, and where, in [rad] or [m]: lift=0.2."""
     action_names: tuple[str, ...] | None = None
@@ -126,6 +127,14 @@ class NewWorkspace:
             ConfigurationError: `hold` is not name=number, or the URDF's flange is not clear.
             FileFormatError: The URDF cannot be read.
         """
+        return read_urdf(path, self.tip, self.base, self.held())
+
+    def held(self) -> dict[str, float]:
+        """Return the joints that stand still, and where.
+
+        Raises:
+            ConfigurationError: One is not name=number.
+        """
         held = dict[str, float]()
         for said in self.hold:
             name, _, position = said.rpartition("=")
@@ -135,7 +144,7 @@ class NewWorkspace:
                 held[name] = math.nan
             if not (name and math.isfinite(held[name])):
                 raise ConfigurationError(f"--hold must be a joint and where: lift=0.2; got {said}")
-        return read_urdf(path, self.tip, self.base, held)
+        return held
 
     def _with_symmetry(self, text: str) -> str:
         """The text with what was said of the object and the box."""

@@ -420,7 +420,7 @@ class Workspace:
         self.state.refuse_open_trial("learning")
         imported = self.standing.imported
         stored = self.store.demonstrations(imported.sha256)
-        if not self.manifest.agrees(stored):
+        if not self.manifest.agrees(stored, in_range=True):
             self.import_demonstrations(stored, imported.source)
             imported = self.standing.imported
         demonstrations = self.demonstrations

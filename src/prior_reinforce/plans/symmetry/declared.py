@@ -16,9 +16,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from msgspec import UNSET
 
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.plans.kinematics import Chain, flange_path
+from prior_reinforce.plans.kinematics import UPRIGHT, Chain, first_axis, leaning
 from prior_reinforce.plans.symmetry.moves import (
     NOMINAL_EXPONENT,
     Amplitude,
@@ -40,8 +41,9 @@ if TYPE_CHECKING:
 About = Literal["base"] | tuple[float, float] | None
 Distance = Literal["tempo", "amplitude", "learned", "shift"]
 _VECTOR, _QUATERNION = ("rx", "ry", "rz"), ("qw", "qx", "qy", "qz")
-_UPRIGHT = 1e-3
-"""How far, [rad] and [m], an axis may be off the vertical through the base (ours)."""
+_ON_AXIS = 1e-3
+"""How far from the first joint's axis a place may be and be on it, [m]. Ours: half a turn about the
+one or the other then differs by 2 mm."""
 _LEAD = 8
 """Frames within which a hand that is told increments is brought to its moved start (ours)."""
 
@@ -54,6 +56,7 @@ def declare_symmetry(
     distance: Distance = "tempo",
     chain: Chain | None = None,
     joints: Sequence[int] = (),
+    ranges: Sequence[tuple[float, float]] = (),
     start: tuple[float, float] = (0.0, 0.0),
     release_frame: float | None = None,
     steps: Sequence[str] = (),
@@ -69,6 +72,7 @@ def declare_symmetry(
             with every further component of the outcome.
         chain: The arm, where plans are of its joints; its base frame is the outcomes'.
         joints: Columns of the chain's joints, in its order.
+        ranges: Their ends, [rad]; turned plans go the other way round where that fits alone.
         start: (x, y) of the hand before increments, [m].
         release_frame: Where a clock lets go, and not the motion.
         steps: Names of grippers and triggers.
@@ -127,10 +131,12 @@ def declare_symmetry(
         )
     centre = (0.0, 0.0) if about == "base" else (float(about[0]), float(about[1]))
     if chain is not None and joints:
-        if about != "base":
-            return turn_and_scale(TurnPath(chain, centre, tuple(joints)), centre, scale, others)
+        if about != "base" and not _on_first_axis(chain, centre):
+            path = TurnPath(chain, centre, tuple(joints), tuple(ranges) or UNSET)
+            return turn_and_scale(path, centre, scale, others)
         gain, centre = _first_joint(chain)
-        return turn_and_scale(TurnJoint(joints[0], gain), centre, scale, others)
+        first = TurnJoint(joints[0], gain, range=ranges[0] if ranges else UNSET)
+        return turn_and_scale(first, centre, scale, others)
     if place := _columns(column, ("x", "y")):
         vector, quaternion = _columns(column, _VECTOR), _columns(column, _QUATERNION)
         for group in euler_angles(form.names, form.units):
@@ -165,11 +171,19 @@ def _first_joint(chain: Chain) -> tuple[float, tuple[float, float]]:
     Raises:
         ConfigurationError: It is not vertical.
     """
-    along = flange_path(chain, np.zeros((1, len(chain.axes)))).jacobians[0, 3:, 0]
-    if np.hypot(along[0], along[1]) > _UPRIGHT:
+    along, (x, y) = first_axis(chain)
+    lean = leaning(along)
+    if lean > UPRIGHT:
         raise ConfigurationError(
-            f"the first joint's axis is not vertical but along {np.round(along, 3).tolist()}; name "
-            "a place (x, y) to turn about instead of the base"
+            f"the first joint's axis leans by {np.degrees(lean):.0f} degrees from the vertical (z "
+            "of the base frame), and no turn of that joint leaves the physics unchanged; name a "
+            'place (x, y) to turn about instead, --symmetry "X Y"'
         )
-    x, y, *_ = chain.origins[0]
-    return float(np.sign(along[2])), (float(x), float(y))
+    return float(np.sign(along[2])), (x, y)
+
+
+def _on_first_axis(chain: Chain, place: tuple[float, float]) -> bool:
+    """Whether the first joint turns about a place: exactly, where kinematics may be singular."""
+    along, _ = first_axis(chain)
+    off = np.cross(np.subtract((*place, 0.0), chain.origins[0][:3]), along)
+    return leaning(along) <= UPRIGHT and bool(np.linalg.norm(off) <= _ON_AXIS)

@@ -16,11 +16,14 @@ from typing import Annotated
 import msgspec
 import numpy as np
 from jaxtyping import Float
+from typing_extensions import Self
 
 from prior_reinforce.arrays import Frames
 from prior_reinforce.plans.kinematics import Chain, turned_path
 
 Columns = tuple[int, ...]
+Ends = tuple[float, float]
+"""Lowest and highest position of a joint, [rad]."""
 Moved = Float[np.ndarray, "H_moved D"]
 """A plan that may be longer than the one it was."""
 NOMINAL_EXPONENT = 1.3
@@ -37,6 +40,7 @@ _COLUMN_FIELDS = (
     "steps",
     "increments",
 )
+_RANGES = ("range", "ranges")
 _MOVING = 0.05
 """A plan ends in mid-swing where its last step is more than this part of its largest (ours)."""
 
@@ -56,6 +60,17 @@ class Move(msgspec.Struct, frozen=True):
     def increments_of(self) -> Columns:
         """Return the columns that it takes for differences from frame to frame."""
         return _columns(getattr(self, "increments", None))
+
+    def ranged_of(self) -> Columns:
+        """Return the columns of turned joints, where it knows their ranges."""
+        known = any(getattr(self, name, None) for name in _RANGES)
+        return self.columns_of() if known else ()
+
+    @property
+    def endless(self) -> Self:
+        """The same for joints of any range."""
+        known = {*_RANGES} & {*self.__struct_fields__}
+        return msgspec.structs.replace(self, **dict.fromkeys(known, msgspec.UNSET))
 
     def _moved(self, plan: Frames, amount: float) -> Moved:
         raise NotImplementedError
@@ -187,11 +202,15 @@ class TurnJoint(Move, frozen=True, tag="turn-joint"):
     """Joint angle for each unit of the amount: -1 where the joint counts clockwise."""
     ramp: int = 0
     """Where the start pose is given: frames within which it turns, by minimum jerk."""
+    range: Ends | msgspec.UnsetType = msgspec.UNSET
+    """Of the joint; a plan that would leave it is turned the other way round where that fits."""
 
     def _moved(self, plan: Frames, amount: float) -> Moved:
         out = plan.copy()
         x = np.clip(np.arange(len(plan)) / self.ramp, 0, 1) if self.ramp else np.ones(len(plan))
         out[:, self.joint] += self.gain * amount * x**3 * (10 - 15 * x + 6 * x**2)
+        if self.range is not msgspec.UNSET and not self.ramp:
+            out[:, self.joint] = _within(out[:, self.joint], self.range)
         return out
 
 
@@ -271,10 +290,14 @@ class TurnPath(Move, frozen=True, tag="turn-path"):
     """(x, y) of the axis in the base frame, [m]."""
     columns: Columns
     """Those of the chain's joints, in its order."""
+    ranges: tuple[Ends, ...] | msgspec.UnsetType = msgspec.UNSET
+    """Of these joints; as `TurnJoint.range`."""
 
     def _moved(self, plan: Frames, amount: float) -> Moved:
         out, columns = plan.copy(), list(self.columns)
         out[:, columns] = turned_path(self.chain, plan[:, columns], amount, self.centre)
+        for column, ends in zip(columns, self.ranges or (), strict=bool(self.ranges)):
+            out[:, column] = _within(out[:, column], ends)
         return out
 
 
@@ -287,6 +310,18 @@ def _columns(*named: Columns | int | None) -> Columns:
     """Columns named one by one, in groups, or not at all."""
     groups = [(each,) if isinstance(each, int) else each or () for each in named]
     return tuple(column for group in groups for column in group)
+
+
+def _within(angles: Float[np.ndarray, " H"], ends: Ends) -> Float[np.ndarray, " H"]:
+    """A joint's angles by as few whole turns from where they are as lie in its range.
+
+    Unchanged where they lie there, or none do: the gate then says by how much.
+    """
+    fewest = math.ceil((ends[0] - angles.min()) / (2 * math.pi))
+    most = math.floor((ends[1] - angles.max()) / (2 * math.pi))
+    if fewest <= 0 <= most or fewest > most:
+        return angles
+    return np.asarray(angles + 2 * math.pi * (fewest if fewest > 0 else most))
 
 
 def middle(plan: Frames) -> float:

@@ -123,6 +123,11 @@ class Symmetry:
         """Columns of a plan that are differences from frame to frame, as its moves say."""
         return tuple(sorted({column for move in self.moves for column in move.increments_of()}))
 
+    @property
+    def endless(self) -> Symmetry:
+        """The same for joints of any range."""
+        return replace(self, moves=tuple(move.endless for move in self.moves))
+
     def speed(self, w: Point) -> float:
         """Return how much faster a plan that is moved by w (k,) is played."""
         at = [w[j] / m.exponent for j, m in enumerate(self.moves) if isinstance(m, Tempo)]
@@ -137,6 +142,17 @@ class Symmetry:
         for each, amount in zip(self.moves, w, strict=True):
             plan = each(plan, float(amount))
         return plan
+
+    def toward(self, moved: Moved, near: Frames) -> Moved:
+        """Return a moved plan by those whole turns of turned joints that begin nearest to another.
+
+        So motions of one pose are mixed and compared as such; where joints' ranges are known.
+        """
+        out = np.array(moved)
+        columns = [column for move in self.moves for column in move.ranged_of()]
+        apart = (near[0, columns] - moved[0, columns]) / (2 * np.pi)
+        out[:, columns] += 2 * np.pi * np.round(apart)
+        return out
 
     def around(self, outcomes: Points) -> Symmetry:
         """Return it with a chart that does not jump amid these outcomes; see `Chart.around`."""
