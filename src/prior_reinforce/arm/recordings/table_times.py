@@ -92,8 +92,9 @@ def with_whole_dates(table: Table) -> Table:
         return table
     both = [" ".join(each) for each in zip(table.cells[date], table.cells[time], strict=True)]
     cells = [both if i == time else own for i, own in enumerate(table.cells) if i != date]
-    names, units = ([*own[:date], *own[date + 1 :]] for own in (table.names, table.units))
-    whole = replace(table, names=tuple(names), units=tuple(units), cells=tuple(cells))
+    kept = [i for i in range(len(table.names)) if i != date]
+    names, units = tuple(table.names[i] for i in kept), tuple(table.units[i] for i in kept)
+    whole = replace(table, names=names, units=units, cells=tuple(cells))
     return table if whole.nanoseconds(names.index(table.names[time])) is None else whole
 
 

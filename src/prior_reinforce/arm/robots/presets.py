@@ -67,12 +67,13 @@ def _presets() -> dict[str, dict[str, RobotLimits]]:
 def _limits(arm: Mapping[str, Any]) -> RobotLimits:
     unit = np.pi / 180 if arm.get("degrees") else 1.0
     rates = ("lower", "upper", "velocity", "acceleration", "jerk")
+    given: dict[str, Any] = {name: unit * np.array(arm[name]) for name in rates if name in arm}
     return RobotLimits(
         robot=arm["robot"],
         firmware=arm.get("firmware", "any"),
         source=arm["source"],
         joint_names=arm["joint_names"],
-        **{name: unit * np.array(arm[name]) for name in rates if name in arm},
+        **given,
         envelopes=tuple(
             VelocityEnvelope(**{name: np.array(values) for name, values in envelope.items()})
             for envelope in arm.get("envelopes", ())

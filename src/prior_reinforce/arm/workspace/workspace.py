@@ -315,8 +315,7 @@ class Workspace:
             What was made of them: print `preview.text`, look at `preview.draw()`.
 
         Raises:
-            InvalidDemonstrationsError, UnclearUnitsError, FileFormatError: See
-                `import_demonstrations`.
+            InvalidDemonstrationsError, UnclearUnitsError, FileFormatError: As it says there.
             TrialStateError: A trial waits to be told.
         """
         from prior_reinforce.arm.recordings import Preprocessing, import_demonstrations
@@ -352,14 +351,14 @@ class Workspace:
         Raises:
             InvalidDemonstrationsError, TrialStateError: As in `import_demonstrations`.
         """
-        from prior_reinforce.arm.recordings import appended
+        from prior_reinforce.arm.recordings.appending import appended
 
         demonstrations, n_before = result.demonstrations, 0
         if left_out := result.preview.inspection.selection.left_out:
             source = f"{source}, without what moves as well: {left_out}"
         if append:
-            n_before = self.demonstrations.n
-            demonstrations = appended(self.demonstrations, demonstrations, result.episodes)
+            before, n_before = self.demonstrations, self.demonstrations.n
+            demonstrations = appended(before, demonstrations, result.episodes)
             source = f"{source}, appended to {n_before}"
         self.import_demonstrations(demonstrations, source)
         return n_before
