@@ -20,6 +20,7 @@ from jaxtyping import Shaped
 
 from prior_reinforce.arm.recordings.beside import may_move, recorded_among
 from prior_reinforce.arm.recordings.bounds import check_bytes, check_numbers
+from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.clock import (
     NO_COLUMN,
     Clock,
@@ -37,7 +38,7 @@ from prior_reinforce.arm.recordings.recording import (
     Recording,
     named_damage,
 )
-from prior_reinforce.arm.recordings.units import is_no_angle, place_names, say_names
+from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.errors import FileFormatError
 
@@ -122,9 +123,9 @@ def _point_to_joints(
     """Raise FileFormatError naming the features of the joints, where the usual one has a place."""
     own = _names(features[key])
     missing = missing_channels(joints, own) if len(own) == widths[key] else []
-    if not missing or not place_names(own):
+    if not missing or Kind.PLACE not in kinds(own):
         return
-    counts = {len(joints), sum(not is_no_angle(joint) for joint in joints)}
+    counts = {len(joints), sum(kind is not Kind.TOOL for kind in kinds(joints))}
     others = [
         name
         for name, width in widths.items()

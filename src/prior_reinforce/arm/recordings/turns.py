@@ -15,8 +15,9 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float, Int
 
+from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.selection import Selection
-from prior_reinforce.arm.recordings.units import is_no_angle, listed
+from prior_reinforce.arm.recordings.units import listed
 from prior_reinforce.arm.robots.limits import RobotLimits, is_joint, with_turns
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.plan_format import PlanFormat
@@ -42,13 +43,6 @@ _SAME = 1e-3
 _NOISE = 0.02
 """The same of a channel that may be no angle: a magnet's current that is switched off steps by
 about a turn too. Ours: an encoder's noise."""
-_ANGLE = re.compile(
-    r"joint|axis|achse|gelenk|winkel|angle|rot|turn|twist|swing|steer|roll|pitch|yaw|heading|azimut"
-    r"|bearing|theta|phi|psi|alpha|beta|gamma|base|basis|waist|torso|shoulder|schulter|elbow"
-    r"|ellbogen|arm|wrist|hand|hip|knee|ankle|neck|head|pan|tilt",
-    re.IGNORECASE,
-)
-"""Names of angles. What has no unit is in radians all the same: a magnet's current."""
 _MOST_TURNS = 3
 
 
@@ -113,18 +107,19 @@ def align(
         said += _align_forms(
             form, episodes, motions, each, TURN[form.units[form.names.index(each[0])]]
         )
-    for i, (name, unit) in enumerate(zip(form.names, form.units, strict=True)):
-        if unit in TURN and name not in taken and not is_no_angle(name):
-            known = name in own or name in angles or _is_angle(name, limits)
-            said += _align_angle(form, episodes, motions, i, limits, known=known, fixed=fixed)
+    known = {*angles, *own, *joints}
+    of_kind = zip(form.names, form.units, kinds(form.names), strict=True)
+    for i, (name, unit, kind) in enumerate(of_kind):
+        if unit in TURN and name not in taken and kind is not Kind.TOOL:
+            sure = name in known or kind is Kind.ANGLE or not _is_word(name)
+            said += _align_angle(form, episodes, motions, i, limits, known=sure, fixed=fixed)
     return form, said
 
 
-def _is_angle(name: str, limits: RobotLimits | None) -> bool:
-    """Whether a channel in radians is an angle by its name, and not only for want of a unit."""
+def _is_word(name: str) -> bool:
+    """Whether a name is a plain word, which without a unit may be anything: a magnet's current."""
     words = re.findall(r"[^\W\d_]+", name)
-    plain = len(words) > 0 and re.search(r"\d", name) is None and max(map(len, words)) > 1
-    return not plain or _ANGLE.search(name) is not None or np.isfinite(_range(name, limits)[0])
+    return max(map(len, words), default=0) > 1 and re.search(r"\d", name) is None
 
 
 def _unit_length(form: PlanFormat, motions: Sequence[np.ndarray]) -> Iterator[tuple[str, ...]]:
@@ -185,7 +180,7 @@ def _flipping(
         turn = TURN.get(form.units[first])
         if turn is None or {*form.units[columns]} != {form.units[first]}:
             continue
-        if not taken.isdisjoint(group) or any(map(is_no_angle, group)):
+        if not taken.isdisjoint(group) or Kind.TOOL in kinds(group):
             continue
         steps = [np.abs(np.diff(motion[:, columns], axis=0)) % turn for motion in motions]
         half = [np.abs(s[:, [0, 2]] - turn / 2).max(axis=1) < HALF * turn for s in steps]

@@ -1,0 +1,168 @@
+"""Takes that are not as the others: in the units that they state, in their numbers, in their times.
+
+Nothing is converted by what another take states. A take that may be in another unit is named, and
+can be left out.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from prior_reinforce.arm.recordings.channels import Kind
+from prior_reinforce.arm.recordings.recording import Recording
+from prior_reinforce.arm.recordings.units import Ambiguity, judge_unit, say_names
+from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.plans.whole_turns import TURN
+from prior_reinforce.units import base_of, factor
+
+_APART: Mapping[str, Sequence[float]] = {"rad": (TURN["deg"] / TURN["rad"],), "m": (100.0, 1000.0)}
+"""How many times larger numbers get by the next unit: rad to deg, m to cm and mm."""
+_ALIKE = 1.5
+"""How many times takes of one task may differ. Ours."""
+_FAR_APART = 20.0
+"""Times apart from which two plausible units are two. Ours."""
+
+
+def in_one_unit(
+    recordings: Sequence[Recording], names: Sequence[str], stated: Sequence[str | None]
+) -> tuple[list[Recording], list[str], list[Ambiguity]]:
+    """Bring each channel into its unit in `stated`, converting takes by what their files state.
+
+    Returns them, a remark on each channel that was in several units, and a doubt on each whose unit
+    some files state and others do not. InvalidDemonstrationsError where units cannot be converted.
+    """
+    scale = np.ones((len(recordings), len(names)))
+    remarks, doubts = [], []
+    for i, name in enumerate(names):
+        takes: dict[str | None, list[int]] = {}
+        for k, recording in enumerate(recordings):
+            takes.setdefault(recording.units[i], []).append(k)
+        silent = takes.pop(None, [])
+        called = {
+            unit: say_names([recordings[k].episode for k in own]) for unit, own in takes.items()
+        }
+        for unit, own in takes.items():
+            there = factor(str(unit), stated[i] or str(unit))
+            if there is None:
+                first = next(iter(takes))
+                raise InvalidDemonstrationsError(
+                    f"{name} is in {first} in {called[first]}, but in {unit} in {called[unit]}; "
+                    "correct what is wrong, or leave it out (--leave-out)"
+                )
+            scale[own, i] = there
+        each = ", ".join(f"in {unit} in {where}" for unit, where in called.items())
+        if len(takes) > 1:
+            remarks.append(f"{name} is {each}, as they state: each is converted")
+        if takes and silent:
+            stating = [k for own in takes.values() for k in own]
+            here, there = (
+                max(np.abs(recordings[k].positions[:, i]).max() for k in own)
+                for own in (silent, stating)
+            )
+            silent_ones = say_names([recordings[k].episode for k in silent])
+            what = (
+                f"{name} is {each} (up to {there:.4g}), and {silent_ones} states no unit (up to "
+                f"{here:.4g}): state it there, or leave out"
+            )
+            doubts.append(
+                _without(what, [recordings[k].episode for k in min(silent, stating, key=len)])
+            )
+    scaled = [
+        replace(r, positions=r.positions * by) if np.any(by != 1) else r
+        for r, by in zip(recordings, scale, strict=True)
+    ]
+    return scaled, remarks, doubts
+
+
+def odd_takes(
+    recordings: Sequence[Recording],
+    names: Sequence[str],
+    kinds: Sequence[Kind],
+    units: Sequence[str],
+    judged: Collection[int],
+) -> tuple[set[str], list[Ambiguity]]:
+    """Return takes that are in another unit than the others by their numbers, and why.
+
+    Of the channels `judged`, angles are held together and lengths together, a gripper by itself.
+    """
+    groups = {
+        unit: [i for i in judged if base_of(units[i])[0] == unit and kinds[i] is not Kind.TOOL]
+        for unit in _APART
+    }
+    alone = [("", [i]) for i in judged if kinds[i] is Kind.TOOL]
+    reach = np.array([np.abs(r.positions).max(axis=0) for r in recordings])
+    found: dict[tuple[str, ...], list[str]] = {}
+    for unit, group in (*groups.items(), *alone):
+        most = reach[:, group].max(axis=1, initial=0.0)
+        odd = apart_from_most(most.tolist(), unit)
+        if not odd:
+            continue
+        usual = np.delete(most, odd).max()
+        worst = odd[int(np.argmax(most[odd]))]
+        where = names[group[int(np.argmax(reach[worst, group]))]]
+        apart = max(most[worst] / usual, usual / most[worst])
+        found.setdefault(tuple(recordings[k].episode for k in odd), []).append(
+            f"{where} of {recordings[worst].episode} reaches {most[worst]:.4g}, and of the others "
+            f"{usual:.4g} at most, {apart:.3g} times apart"
+        )
+    doubts = [
+        _without(
+            f"{'; '.join(whats)}: {say_names(episodes)} may be in another unit; convert what is, "
+            "or leave it out",
+            episodes,
+        )
+        for episodes, whats in found.items()
+    ]
+    return {name for episodes in found for name in episodes}, doubts
+
+
+def apart_from_most(reach: Sequence[float], unit: str) -> list[int]:
+    """Return the takes whose numbers are apart from most others' by as much as two units are.
+
+    `reach` is the largest number of each take: of angles in `rad`, of lengths in `m`, else of what
+    is a share where it is at most 1.
+    """
+    middle = sorted(reach)[(len(reach) - 1) // 2]
+    odd = []
+    for k, number in enumerate(reach):
+        if min(number, middle) <= 0:
+            continue
+        apart = max(number / middle, middle / number)
+        looks, usual = (judge_unit(unit, n) if unit else str(n <= 1) for n in (number, middle))
+        between = any(f / _ALIKE <= apart <= f * _ALIKE for f in _APART.get(unit, ()))
+        if between or (looks != usual and apart >= _FAR_APART):
+            odd.append(k)
+    return odd
+
+
+def doubts_of_times(recordings: Sequence[Recording]) -> list[Ambiguity]:
+    """What is only guessed of the times, one doubt for each option.
+
+    Where some takes only are in another unit, the fewer are to be left out: no option holds for
+    all.
+    """
+    found = {one.option: one for r in reversed(recordings) for one in r.ambiguities}
+    for option, doubt in list(found.items()):
+        asked = [r.episode for r in recordings if option in [one.option for one in r.ambiguities]]
+        others = [r.episode for r in recordings if r.episode not in asked]
+        if not option.startswith("--time-unit") or not others:
+            continue
+        what = (
+            f"{say_names(asked)}: {doubt.what}, but {say_names(others)} would not be in that "
+            "unit: convert what is in another one than the rest, or leave it out"
+        )
+        fewer = min(asked, others, key=len)
+        if fewer is asked:
+            del found[option]
+        alone = _without(what, fewer)
+        found[alone.option] = alone
+    return list(found.values())
+
+
+def _without(what: str, episodes: Sequence[str]) -> Ambiguity:
+    """A doubt that leaving some takes out settles."""
+    return Ambiguity(what, f"--leave-out {shlex.join(episodes)}", guessed=False)
