@@ -45,7 +45,7 @@ def test_an_axis_that_may_slide_is_not_taken_in_degrees_with_the_joints():
 
 def test_more_than_a_hundred_percent_is_refused_with_both_numbers():
     some = takes(("j1", "robotiq_pos"), (1, 220))
-    with pytest.raises(ConfigurationError, match=r"reaches 220 in t0, .*a range has 100"):
+    with pytest.raises(ConfigurationError, match=r"robotiq_pos of t0 reaches 220, .*range has 100"):
         select(some, units=["rad", "percent"])
     assert select(some, units=["rad", "counts"]).units == ("rad", "counts")
 

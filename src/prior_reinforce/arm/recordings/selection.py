@@ -10,7 +10,7 @@ import numpy as np
 
 from prior_reinforce.arm.recordings.beside import columns_beside
 from prior_reinforce.arm.recordings.channels import Kind, kinds, one_for_all
-from prior_reinforce.arm.recordings.judging import UNIT, Given, judge
+from prior_reinforce.arm.recordings.judging import UNIT, Given, Judge, beliefs_of
 from prior_reinforce.arm.recordings.naming import (
     find_channels,
     joint_vectors,
@@ -18,7 +18,14 @@ from prior_reinforce.arm.recordings.naming import (
     numbered_like,
 )
 from prior_reinforce.arm.recordings.recording import Recording
-from prior_reinforce.arm.recordings.units import Ambiguity, conversion, listed, say_names
+from prior_reinforce.arm.recordings.takes import in_one_unit, odd_takes
+from prior_reinforce.arm.recordings.units import (
+    Ambiguity,
+    conversion,
+    known_unit,
+    listed,
+    say_names,
+)
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.plans.whole_turns import TURN
 
@@ -114,17 +121,35 @@ def select(
             "percent, ... in its place, or counts for a number without a unit"
         )
     picked = [_picked(*each, joints) for each in zip(recordings, columns, strict=True)]
-    found = judge(picked, names, stated, plan_units, given=given, normalised=normalised)
-    each = zip(found.recorded, found.wanted, names, strict=True)
-    scale, wanted = [conversion(*one) for one in each], tuple(found.wanted)
+    stated = [_stated_unit(picked, i, unit) for i, unit in enumerate(stated)]
+    takes, mixed, unsaid = in_one_unit(picked, names, stated)
+    beliefs = beliefs_of(takes, names, stated, plan_units)
+    told = [[r.units[i] is not None for r in picked] for i in range(len(names))]
+    # What some files state and others do not is asked about anyway, unless it is given.
+    open_ = [b for b, own in zip(beliefs, told, strict=True) if not (all if given else any)(own)]
+    odd, differ = odd_takes(open_)
+    judge = Judge(
+        [belief.without(odd) for belief in beliefs],
+        given,
+        silent=not any(map(any, told)),
+        fixed=plan_units is not None,
+        normalised=normalised,
+    )
+    questions, (remarks, other) = judge.questions(), judge.remarks()
+    if given:
+        remarks = [*(doubt.what for doubt in differ), *remarks]
+    else:
+        questions = [*unsaid, *differ, *questions]
+    recorded, wanted = judge.recorded(), tuple(belief.wanted for belief in beliefs)
+    scale = [conversion(*each) for each in zip(recorded, wanted, names, strict=True)]
     return Selection(
-        tuple(replace(r, positions=r.positions * scale, units=wanted) for r in found.recordings),
+        tuple(replace(r, positions=r.positions * scale, units=wanted) for r in takes),
         names,
         wanted,
-        tuple(found.recorded),
-        (*guessed, *found.questions),
-        tuple(found.remarks),
-        found.other_unit,
+        tuple(recorded),
+        (*guessed, *questions),
+        (*mixed, *remarks),
+        other,
         _left_out(recordings, columns),
     )
 
@@ -235,3 +260,19 @@ def _left_out(recordings: Sequence[Recording], columns: Sequence[list[int]]) -> 
         for name, spans in ranges.items()
     ]
     return listed(said, "; ")
+
+
+def _stated_unit(recordings: Sequence[Recording], channel: int, given: str | None) -> str | None:
+    """Unit of a channel as given, else as the first file that states one does; None if none does.
+
+    ConfigurationError if a file states another than the one that is given.
+    """
+    given = given if given is None else known_unit(given) or given
+    for recording in recordings:
+        own = recording.units[channel]
+        if own is not None and given not in (None, own):
+            raise ConfigurationError(
+                f"{recording.columns[channel]} of episode {recording.episode} is in {own}, but "
+                f"--units says {given}; correct or drop it"
+            )
+    return given or next((r.units[channel] for r in recordings if r.units[channel]), None)

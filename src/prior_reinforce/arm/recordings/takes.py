@@ -7,12 +7,13 @@ can be left out.
 from __future__ import annotations
 
 import shlex
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from prior_reinforce.arm.recordings.channels import Kind
+from prior_reinforce.arm.recordings.judging import Belief
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.units import Ambiguity, judge_unit, say_names
 from prior_reinforce.errors import InvalidDemonstrationsError
@@ -78,37 +79,31 @@ def in_one_unit(
     return scaled, remarks, doubts
 
 
-def odd_takes(
-    recordings: Sequence[Recording],
-    names: Sequence[str],
-    kinds: Sequence[Kind],
-    units: Sequence[str],
-    judged: Collection[int],
-) -> tuple[set[str], list[Ambiguity]]:
+def odd_takes(beliefs: Sequence[Belief]) -> tuple[set[str], list[Ambiguity]]:
     """Return takes that are in another unit than the others by their numbers, and why.
 
-    Of the channels `judged`, angles are held together and lengths together, a gripper by itself.
+    Angles are held together and lengths together, a gripper by itself.
     """
-    groups = {
-        unit: [i for i in judged if base_of(units[i])[0] == unit and kinds[i] is not Kind.TOOL]
+    groups: list[tuple[str, list[Belief]]] = [
+        (unit, [b for b in beliefs if b.kind is not Kind.TOOL and base_of(b.unit)[0] == unit])
         for unit in _APART
-    }
-    alone = [("", [i]) for i in judged if kinds[i] is Kind.TOOL]
-    reach = np.array([np.abs(r.positions).max(axis=0) for r in recordings])
+    ]
+    groups += [("", [one]) for one in beliefs if one.kind is Kind.TOOL]
     found: dict[tuple[str, ...], list[str]] = {}
-    for unit, group in (*groups.items(), *alone):
-        most = reach[:, group].max(axis=1, initial=0.0)
-        odd = apart_from_most(most.tolist(), unit)
-        if not odd:
+    for unit, group in groups:
+        if not group:
             continue
-        usual = np.delete(most, odd).max()
-        worst = odd[int(np.argmax(most[odd]))]
-        where = names[group[int(np.argmax(reach[worst, group]))]]
-        apart = max(most[worst] / usual, usual / most[worst])
-        found.setdefault(tuple(recordings[k].episode for k in odd), []).append(
-            f"{where} of {recordings[worst].episode} reaches {most[worst]:.4g}, and of the others "
-            f"{usual:.4g} at most, {apart:.3g} times apart"
-        )
+        most = {take: max(one.reach[take] for one in group) for take in group[0].reach}
+        odd = apart_from_most(most, unit)
+        if odd:
+            usual = max(number for take, number in most.items() if take not in odd)
+            worst = max(odd, key=lambda take: most[take])
+            name = next(one.name for one in group if one.reach[worst] == most[worst])
+            apart = max(most[worst] / usual, usual / most[worst])
+            found.setdefault(odd, []).append(
+                f"{name} of {worst} reaches {most[worst]:.4g}, and of the others {usual:.4g} at "
+                f"most, {apart:.3g} times apart"
+            )
     doubts = [
         _without(
             f"{'; '.join(whats)}: {say_names(episodes)} may be in another unit; convert what is, "
@@ -120,23 +115,23 @@ def odd_takes(
     return {name for episodes in found for name in episodes}, doubts
 
 
-def apart_from_most(reach: Sequence[float], unit: str) -> list[int]:
+def apart_from_most(reach: Mapping[str, float], unit: str) -> tuple[str, ...]:
     """Return the takes whose numbers are apart from most others' by as much as two units are.
 
     `reach` is the largest number of each take: of angles in `rad`, of lengths in `m`, else of what
     is a share where it is at most 1.
     """
-    middle = sorted(reach)[(len(reach) - 1) // 2]
+    middle = sorted(reach.values())[(len(reach) - 1) // 2]
     odd = []
-    for k, number in enumerate(reach):
+    for take, number in reach.items():
         if min(number, middle) <= 0:
             continue
         apart = max(number / middle, middle / number)
         looks, usual = (judge_unit(unit, n) if unit else str(n <= 1) for n in (number, middle))
         between = any(f / _ALIKE <= apart <= f * _ALIKE for f in _APART.get(unit, ()))
         if between or (looks != usual and apart >= _FAR_APART):
-            odd.append(k)
-    return odd
+            odd.append(take)
+    return tuple(odd)
 
 
 def doubts_of_times(recordings: Sequence[Recording]) -> list[Ambiguity]:
