@@ -76,19 +76,9 @@ def select(
 ) -> Selection:
     """Pick, order, convert and rename the channels of every recording.
 
-    Frames with a value that is not finite are dropped, as lost packets are.
-
-    Args:
-        recordings: At least one.
-        joints: Recorded names to keep, in order, or of all columns where these have none; None
-            keeps those of the first recording.
-        names: Their names in the plan; None keeps the recorded names. If they equal `joints` and
-            no column has these names, as many numbered columns are a guess.
-        units: Recorded units; a single one holds for all channels that can be in it: degrees for
-            joints, not for a gripper in percent. None takes those that the recordings state, else
-            the plan's; if no arm reaches such values, the unit is guessed.
-        plan_units: Units of the plan; None takes rad for angles and what has none, m for lengths.
-        normalised: Whether the recorder also writes shares of each joint's range, -100 to 100.
+    Frames with a value that is not finite are dropped, as lost packets are. `joints` and `units`
+    are those of `ReadOptions`, `names` and `plan_units` those of `import_demonstrations`; with
+    `normalised`, the recorder also writes shares of each joint's range, -100 to 100.
 
     Raises:
         InvalidDemonstrationsError: A joint that a recording lacks, or too many lost frames.
