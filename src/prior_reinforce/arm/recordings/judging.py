@@ -160,7 +160,7 @@ class Judge:
 
     def _is_no_angle(self, one: Belief) -> Doubt | None:
         """What turns too far is none: a gripper, or a name without meaning beside joints."""
-        beside = one in self.far and len(self.far) < len(self.angles) and not self.fixed
+        beside = one in self.far and len(self.far) < len(self.angles)
         unnamed = beside and one.kind not in (Kind.ANGLE, Kind.ROTATION)
         none = one.kind is Kind.TOOL or unnamed
         if one.stated or one.unit not in TURN or not none or self._looks(one) == one.unit:
