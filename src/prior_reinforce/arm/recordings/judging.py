@@ -7,7 +7,7 @@ stated is asked about. What somebody stated is believed where an arm can do it, 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, NamedTuple
@@ -221,24 +221,27 @@ class Judge:
             for one, unit in self._answers.items()
         ]
 
-    def questions(self) -> list[Ambiguity]:
-        """Ask about units, one question for what looks alike, all with one option."""
+    def _groups(self, *, asked: bool) -> Iterator[tuple[str, Doubt, list[Belief], Belief]]:
+        """Channels whose units are doubted alike, and of these the one with the largest number."""
         groups: dict[tuple[str, Doubt], list[Belief]] = {}
         for one, doubt in self._doubts.items():
-            groups.setdefault((one.unit, doubt), []).append(one)
+            if doubt.asked == asked:
+                groups.setdefault((one.unit, doubt), []).append(one)
+        for (unit, doubt), among in groups.items():
+            yield unit, doubt, among, max(among, key=lambda one: one.largest)
+
+    def questions(self) -> list[Ambiguity]:
+        """Ask about units, one question for what looks alike, all with one option."""
         units = list(self._answers.values())
         option = f"--units {' '.join(units if len({*units}) > 1 else units[:1])}"
+        by = ", as --units says," if self.given else ""
         questions = []
-        for (unit, doubt), among in groups.items():
-            if not doubt.asked:
-                continue
-            worst = max(among, key=lambda one: one.largest)
+        for unit, doubt, among, worst in self._groups(asked=True):
             seen = f"it looks like {doubt.looks}"
             if doubt.looks == UNIT:
                 seen = f"put its unit in the place of {UNIT}"
             elif doubt.looks == "deg" and self.normalised and worst.largest <= 100:
                 seen += _NORMALISED
-            by = ", as --units says," if self.given else ""
             what = (
                 f"{say_names([one.name for one in among])} in {unit}{by} would reach "
                 f"{worst.largest:.4g} ({worst.where}), {doubt.why}: {seen}"
@@ -248,18 +251,13 @@ class Judge:
 
     def remarks(self) -> tuple[list[str], str]:
         """Remark on doubtful units that somebody stated; with the option for another, if any."""
-        worst: dict[tuple[str, str], Belief] = {}
-        for one, (looks, _, asked) in self._doubts.items():
-            if not asked and looks != UNIT:
-                known = worst.setdefault((one.unit, looks), one)
-                worst[one.unit, looks] = max(known, one, key=lambda one: one.largest)
         remarks, other = [], ""
-        for (unit, looks), one in worst.items():
-            other = f"--units {looks}" if self._one_option else ""
-            advice = f"if it was recorded in {looks}, say {other}" if other else "check its unit"
-            remarks.append(
-                f"{one.where} reaches {one.largest:.4g} {unit}, and arms do not: {advice}"
-            )
+        for unit, (looks, _, _), _, worst in self._groups(asked=False):
+            if looks != UNIT:
+                other = f"--units {looks}" if self._one_option else ""
+                said = f"if it was recorded in {looks}, say {other}" if other else "check its unit"
+                what = f"{worst.where} reaches {worst.largest:.4g} {unit}, and arms do not: {said}"
+                remarks.append(what)
         degrees = bool(self.angles) and {*map(self._answers.get, self.angles)} == {"deg"}
         shares = self.normalised and all(angle.largest <= 100 for angle in self.angles)
         if self.given and degrees and shares and not self.questions():

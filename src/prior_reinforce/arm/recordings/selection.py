@@ -19,13 +19,7 @@ from prior_reinforce.arm.recordings.naming import (
 )
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.takes import in_one_unit, odd_takes
-from prior_reinforce.arm.recordings.units import (
-    Ambiguity,
-    conversion,
-    known_unit,
-    listed,
-    say_names,
-)
+from prior_reinforce.arm.recordings.units import Ambiguity, conversion, listed, say_names
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.plans.whole_turns import TURN
 
@@ -111,20 +105,14 @@ def select(
             "percent, ... in its place, or counts for a number without a unit"
         )
     picked = [_picked(*each, joints) for each in zip(recordings, columns, strict=True)]
-    stated = [_stated_unit(picked, i, unit) for i, unit in enumerate(stated)]
-    takes, mixed, unsaid = in_one_unit(picked, names, stated)
+    takes, stated, mixed, unsaid = in_one_unit(picked, names, stated)
     beliefs = beliefs_of(takes, names, stated, plan_units)
     told = [[r.units[i] is not None for r in picked] for i in range(len(names))]
     # What some files state and others do not is asked about anyway, unless it is given.
     open_ = [b for b, own in zip(beliefs, told, strict=True) if not (all if given else any)(own)]
     odd, differ = odd_takes(open_)
-    judge = Judge(
-        [belief.without(odd) for belief in beliefs],
-        given,
-        silent=not any(map(any, told)),
-        fixed=plan_units is not None,
-        normalised=normalised,
-    )
+    silent, fixed = not any(map(any, told)), plan_units is not None
+    judge = Judge([b.without(odd) for b in beliefs], given, silent, fixed, normalised)
     questions, (remarks, other) = judge.questions(), judge.remarks()
     if given:
         remarks = [*(doubt.what for doubt in differ), *remarks]
@@ -250,19 +238,3 @@ def _left_out(recordings: Sequence[Recording], columns: Sequence[list[int]]) -> 
         for name, spans in ranges.items()
     ]
     return listed(said, "; ")
-
-
-def _stated_unit(recordings: Sequence[Recording], channel: int, given: str | None) -> str | None:
-    """Unit of a channel as given, else as the first file that states one does; None if none does.
-
-    ConfigurationError if a file states another than the one that is given.
-    """
-    given = given if given is None else known_unit(given) or given
-    for recording in recordings:
-        own = recording.units[channel]
-        if own is not None and given not in (None, own):
-            raise ConfigurationError(
-                f"{recording.columns[channel]} of episode {recording.episode} is in {own}, but "
-                f"--units says {given}; correct or drop it"
-            )
-    return given or next((r.units[channel] for r in recordings if r.units[channel]), None)

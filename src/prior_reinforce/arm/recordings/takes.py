@@ -9,14 +9,15 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
 from prior_reinforce.arm.recordings.channels import Kind
 from prior_reinforce.arm.recordings.judging import Belief
 from prior_reinforce.arm.recordings.recording import Recording
-from prior_reinforce.arm.recordings.units import Ambiguity, judge_unit, say_names
-from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.arm.recordings.units import Ambiguity, judge_unit, known_unit, say_names
+from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.plans.whole_turns import TURN
 from prior_reinforce.units import base_of, factor
 
@@ -29,54 +30,63 @@ _FAR_APART = 20.0
 
 
 def in_one_unit(
-    recordings: Sequence[Recording], names: Sequence[str], stated: Sequence[str | None]
-) -> tuple[list[Recording], list[str], list[Ambiguity]]:
-    """Bring each channel into its unit in `stated`, converting takes by what their files state.
+    recordings: Sequence[Recording], names: Sequence[str], given: Sequence[str | None]
+) -> tuple[list[Recording], list[str | None], list[str], list[Ambiguity]]:
+    """Bring each channel into the unit that is given, else into that of the first file stating one.
 
-    Returns them, a remark on each channel that was in several units, and a doubt on each whose unit
-    some files state and others do not. InvalidDemonstrationsError where units cannot be converted.
+    Returns the takes, each converted by what its own file states; the channels' units; a remark on
+    each channel that was in several; a doubt on each whose unit some files state and others do not.
+
+    Raises:
+        ConfigurationError: A file states another unit than the one that is given.
+        InvalidDemonstrationsError: Two files state units of which one cannot be converted.
     """
-    scale = np.ones((len(recordings), len(names)))
+    scale, stated = np.ones((len(recordings), len(names))), list[str | None]()
     remarks, doubts = [], []
-    for i, name in enumerate(names):
-        takes: dict[str | None, list[int]] = {}
-        for k, recording in enumerate(recordings):
-            takes.setdefault(recording.units[i], []).append(k)
-        silent = takes.pop(None, [])
-        called = {
-            unit: say_names([recordings[k].episode for k in own]) for unit, own in takes.items()
-        }
-        for unit, own in takes.items():
-            there = factor(str(unit), stated[i] or str(unit))
-            if there is None:
-                first = next(iter(takes))
+    for i, (name, unit) in enumerate(zip(names, given, strict=True)):
+        takes: dict[str, list[Recording]] = {}
+        for recording in recordings:
+            takes.setdefault(recording.units[i] or "", []).append(recording)
+        silent = takes.pop("", [])
+        called = {own: _called(of_unit) for own, of_unit in takes.items()}
+        first = next(iter(takes), None)
+        said = unit and (known_unit(unit) or unit)
+        stated.append(said or first)
+        for own, of_unit in takes.items():
+            by = factor(own, said or str(first))
+            if said not in (None, own):
+                raise ConfigurationError(
+                    f"{of_unit[0].columns[i]} of episode {of_unit[0].episode} is in {own}, but "
+                    f"--units says {said}; correct or drop it"
+                )
+            if by is None:
                 raise InvalidDemonstrationsError(
-                    f"{name} is in {first} in {called[first]}, but in {unit} in {called[unit]}; "
+                    f"{name} is in {first} in {called[str(first)]}, but in {own} in {called[own]}; "
                     "correct what is wrong, or leave it out (--leave-out)"
                 )
-            scale[own, i] = there
-        each = ", ".join(f"in {unit} in {where}" for unit, where in called.items())
+            scale[[r.units[i] == own for r in recordings], i] = by
+        each = ", ".join(f"in {own} in {where}" for own, where in called.items())
         if len(takes) > 1:
             remarks.append(f"{name} is {each}, as they state: each is converted")
         if takes and silent:
-            stating = [k for own in takes.values() for k in own]
+            stating = [*chain(*takes.values())]
             here, there = (
-                max(np.abs(recordings[k].positions[:, i]).max() for k in own)
-                for own in (silent, stating)
+                max(np.abs(r.positions[:, i]).max() for r in of) for of in (silent, stating)
             )
-            silent_ones = say_names([recordings[k].episode for k in silent])
             what = (
-                f"{name} is {each} (up to {there:.4g}), and {silent_ones} states no unit (up to "
-                f"{here:.4g}): state it there, or leave out"
+                f"{name} is {each} (up to {there:.4g}), and {_called(silent)} states no unit (up "
+                f"to {here:.4g}): state it there, or leave out"
             )
-            doubts.append(
-                _without(what, [recordings[k].episode for k in min(silent, stating, key=len)])
-            )
+            doubts.append(_without(what, [r.episode for r in min(silent, stating, key=len)]))
     scaled = [
         replace(r, positions=r.positions * by) if np.any(by != 1) else r
         for r, by in zip(recordings, scale, strict=True)
     ]
-    return scaled, remarks, doubts
+    return scaled, stated, remarks, doubts
+
+
+def _called(recordings: Sequence[Recording]) -> str:
+    return say_names([recording.episode for recording in recordings])
 
 
 def odd_takes(beliefs: Sequence[Belief]) -> tuple[set[str], list[Ambiguity]]:
