@@ -1,7 +1,8 @@
 """What a recorded channel is by its name: one table for all that read, judge and align channels.
 
 A name tells a kind, and the kind the units that its numbers may be in. Some kinds are told by the
-names beside: `x` is a place beside `y`, and an entry of a matrix has eight others.
+names beside: `x` is a place beside `y`, and an entry of a matrix has eight others. Which names are
+no position of a robot's joint at all, a rate for instance, `robots.limits.says_no_position` tells.
 """
 
 from __future__ import annotations
