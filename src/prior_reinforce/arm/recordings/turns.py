@@ -66,12 +66,16 @@ def aligned(selection: Selection, limits: RobotLimits | None) -> tuple[Selection
     form = with_turns(PlanFormat(selection.names, selection.units, 1.0), limits)
     recorded = zip(selection.names, selection.recorded_units, strict=True)
     degrees = {name for name, unit in recorded if unit == "deg"}
-    # `rx`, `ry`, `rz` are a rotation vector where they are in radians, and else Euler angles.
-    euler = [g for g in euler_angles(form.names, form.units) if degrees.issuperset(g)]
-    told = [g for g in form.attitudes if {*g} in map(set, euler)]
-    form = replace(form, attitudes=tuple(g for g in form.attitudes if g not in told))
     motions = [np.array(recording.positions) for recording in selection.recordings]
-    form = replace(form, attitudes=tuple(_unit_length(form, motions)))
+    # `rx`, `ry`, `rz` are a rotation vector where they are in radians, and else Euler angles.
+    euler = [{*g} for g in euler_angles(form.names, form.units) if degrees.issuperset(g)]
+    told = [g for g in form.attitudes if {*g} in euler]
+    kept = []
+    for group in form.attitudes:
+        own = [motion[:, [form.names.index(name) for name in group]] for motion in motions]
+        if group not in told and (len(group) == 3 or _off_length_1(own) < _NORM):
+            kept.append(group)
+    form = replace(form, attitudes=tuple(kept))
     form, said = align(form, selection.episodes, motions, limits, angles=degrees)
     form = replace(form, periodic=tuple(dict.fromkeys((*form.periodic, *chain(*told)))))
     recordings = tuple(
@@ -132,15 +136,6 @@ def _is_word(name: str) -> bool:
     return max(map(len, words), default=0) > 1 and re.search(r"\d", name) is None
 
 
-def _unit_length(form: PlanFormat, motions: Sequence[np.ndarray]) -> Iterator[tuple[str, ...]]:
-    """Attitudes, without those called like a quaternion whose numbers have not length 1."""
-    for group in form.attitudes:
-        columns = [form.names.index(name) for name in group]
-        lengths = np.concatenate([np.linalg.norm(m[:, columns], axis=1) for m in motions])
-        if len(group) == 3 or np.all(np.abs(lengths - 1) < _NORM):
-            yield group
-
-
 def _consecutive(
     form: PlanFormat,
     motions: Sequence[np.ndarray],
@@ -162,11 +157,14 @@ def _consecutive(
     return found
 
 
+def _off_length_1(motions: Sequence[np.ndarray]) -> float:
+    return max(float(np.abs(np.linalg.norm(motion, axis=1) - 1).max()) for motion in motions)
+
+
 def _are_quaternions(motions: Sequence[np.ndarray], units: set[str]) -> bool:
     """Whether four numbers that move have length 1 throughout."""
-    every = np.concatenate(motions)
-    far = np.abs(np.linalg.norm(every, axis=1) - 1).max()
-    return bool(units <= _OF_VECTORS and np.ptp(every, axis=0).max() > _STILL and far < _SAME)
+    moves = np.ptp(np.concatenate(motions), axis=0).max() > _STILL
+    return bool(units <= _OF_VECTORS and moves and _off_length_1(motions) < _SAME)
 
 
 def _start_at_two_forms(motions: Sequence[np.ndarray], units: set[str]) -> bool:
