@@ -8,11 +8,14 @@ from prior_reinforce.arm.recordings.channels import Kind, kinds, one_for_all
 @pytest.mark.parametrize(
     ("kind", "names"),
     [
-        (Kind.ANGLE, "joint3 q[0] A1 baseYaw panda_joint4 Handgelenk axis_2 current_elbow theta"),
+        (
+            Kind.ANGLE,
+            "joint3 q[0] A1 baseYaw panda_joint4 Handgelenk axis_2 current_elbow upperarm",
+        ),
         (Kind.ANGLE, "gripper_yaw Gripper/Roll index_finger_mcp linear_angle"),
         (Kind.TOOL, "gripper finger_joint1 robotiq_pos pressure 夹爪 linear_gripper Greiferweite"),
         (Kind.SLIDE, "E1 rail ext_axis_1 linearAxis slider prismatic_joint"),
-        (Kind.UNKNOWN, "foo magnet crank scroll x z"),
+        (Kind.UNKNOWN, "foo magnet crank spring x z"),
         (Kind.PLACE, "tool.x tool.y"),
         (Kind.PLACE, "gripper_tip_x gripper_tip_y gripper_tip_z"),
         (Kind.ROTATION, "rx ry rz"),

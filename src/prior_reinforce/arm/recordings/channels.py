@@ -41,16 +41,14 @@ class Kind(Enum):
 
 
 _ALWAYS = rf"{CIRCLES}|pitch|rotation|angle|winkel|mcp|pip|dip|cmc|flex(ion)?|abd(uction)?"
-_JOINT = (
-    r"j|q|a|pan|tilt|turn|rot|base|basis|hip|knee|neck|head|(fore|upper)?arm|theta|phi|psi|alpha"
-    r"|beta|gamma"
-)
+_ALONE = "j|q|a"
 _WITHIN = (
-    r"joint|gelenk|axis|achse|winkel|angle|rotat|twist|swing|steer|pitch|yaw|heading|azimut|bearing"
-    r"|shoulder|schulter|elbow|ellbogen|wrist|waist|torso|ankle"
+    r"joint|axis|achse|gelenk|winkel|angle|rot|turn|twist|swing|steer|roll|pitch|yaw|heading|azimut"
+    r"|bearing|theta|phi|psi|alpha|beta|gamma|base|basis|waist|torso|shoulder|schulter|elbow"
+    r"|ellbogen|arm|wrist|hand|hip|knee|ankle|neck|head|pan|tilt"
 )
-"""Words of angles: those that outweigh a gripper's, those of joints, and those that are also told
-within longer words (`Handgelenk`)."""
+"""Words of angles: those that outweigh a gripper's, those that stand alone, and those that are told
+within longer words too (`Handgelenk`)."""
 _TOOL = (
     r"grip|jaw|finger|width|claw|opening|suction|robotiq|wsg|greifer|pince|夹爪|夹具|vacuum|valve"
     r"|pressure|force|torque|voltage|temperature"
@@ -67,7 +65,7 @@ _BY_WORD = (
     (re.compile(_word(_ALWAYS), re.IGNORECASE), Kind.ANGLE),
     (re.compile(_TOOL, re.IGNORECASE), Kind.TOOL),
     (re.compile(_word(_SLIDE), re.IGNORECASE), Kind.SLIDE),
-    (re.compile(rf"{_word(_JOINT)}|{_WITHIN}", re.IGNORECASE), Kind.ANGLE),
+    (re.compile(rf"{_word(_ALONE)}|{_WITHIN}", re.IGNORECASE), Kind.ANGLE),
 )
 """Kinds by a word in the name; the first counts."""
 _COORDINATE = re.compile(r"(?P<group>|.*[^a-z0-9])(?P<part>[xyz])", re.IGNORECASE)

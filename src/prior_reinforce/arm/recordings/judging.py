@@ -178,7 +178,7 @@ class Judge:
         """A number beyond what arms do is in another unit; an angle with those that share it."""
         looks, why = self._looks(one), _NOT_DONE
         if looks == one.unit:
-            return Doubt("deg", why) if one in self.far else None
+            return Doubt("deg", why) if one in self.far and looks != "deg" else None
         if one.unit == "percent":
             why = _HARDLY if looks else "which no share of a range does"
             if self.given and self.silent and one.stated and one.largest > _MOST_PERCENT:
@@ -190,8 +190,13 @@ class Judge:
 
     @cached_property
     def _one_option(self) -> bool:
-        """Whether --units could give one unit for all, and contradicts no file."""
-        return self.silent and len({one.unit for one in self.beliefs}) == 1
+        """Whether --units could give one unit for all, and contradicts no file.
+
+        Quaternions and matrices, which have none, are let alone.
+        """
+        pure = (Kind.QUATERNION, Kind.MATRIX)
+        units = {one.unit for one in self.beliefs if one.stated or one.kind not in pure}
+        return self.silent and len(units) == 1
 
     @cached_property
     def _doubts(self) -> dict[Belief, Doubt]:
