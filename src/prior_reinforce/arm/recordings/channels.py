@@ -40,12 +40,13 @@ class Kind(Enum):
         return "1" if share or self in (Kind.QUATERNION, Kind.MATRIX) else "rad"
 
 
-_ALWAYS = rf"{CIRCLES}|pitch|rotation|angle|winkel|mcp|pip|dip|cmc|flex(ion)?|abd(uction)?"
+_TURN = rf"{CIRCLES}|pitch|rotation|angle|winkel"
+_ALWAYS = rf"{_TURN}|mcp|pip|dip|cmc|flex(ion)?|abd(uction)?"
 _ALONE = "j|q|a"
 _WITHIN = (
-    r"joint|axis|achse|gelenk|winkel|angle|rot|turn|twist|swing|steer|roll|pitch|yaw|heading|azimut"
-    r"|bearing|theta|phi|psi|alpha|beta|gamma|base|basis|waist|torso|shoulder|schulter|elbow"
-    r"|ellbogen|arm|wrist|hand|hip|knee|ankle|neck|head|pan|tilt"
+    rf"{_TURN}|joint|axis|achse|gelenk|rot|turn|twist|swing|steer|theta|phi|psi|alpha|beta|gamma"
+    r"|base|basis|waist|torso|shoulder|schulter|elbow|ellbogen|arm|wrist|hand|hip|knee|ankle|neck"
+    r"|head|pan|tilt"
 )
 """Words of angles: those that outweigh a gripper's, those that stand alone, and those that are told
 within longer words too (`Handgelenk`)."""
