@@ -63,3 +63,15 @@ def test_coordinates_of_one_place_are_in_one_unit():
     assert "x, y, z in m would reach 450 (x of t0), which no arm does: it looks like mm" in (
         asked.what
     )
+
+
+def test_what_no_arm_does_is_asked_about_beside_a_quaternion_too():
+    names = ("j1", "j2", "qx", "qy", "qz", "qw")
+    (asked,) = select(takes(names, (60, -90, 0, 0, 0.6, 0.8)), units=["rad"]).ambiguities
+    assert asked.option == "--units deg deg 1 1 1 1"
+
+
+def test_an_angle_that_is_stated_in_degrees_is_not_doubted_with_others():
+    found = select(takes(("j1", "j2"), (40, 53), units=[("deg", None)]))
+    assert (found.recorded_units, found.remarks) == (("deg", "deg"), ())
+    assert [one.option for one in found.ambiguities] == ["--units deg"]
