@@ -19,11 +19,9 @@ TURN: Mapping[str, float] = {"rad": 2 * math.pi, "deg": 360.0}
 HALF = 0.01
 """Share of a turn by which a step of half a turn may be more or less. Ours: what a wrist turns in
 one frame."""
-_WHOLE_CIRCLE = re.compile(
-    r"(^|[^a-z])(yaw|roll|heading|azimuth|azimut|bearing|gier(winkel)?|roll(winkel)?)($|[^a-z])",
-    re.IGNORECASE,
-)
+CIRCLES = r"yaw|roll|heading|azimuth?|bearing|gier(winkel)?|roll(winkel)?"
 """Names of angles that nothing stops."""
+_WHOLE_CIRCLE = re.compile(rf"(^|[^a-z])({CIRCLES})($|[^a-z])", re.IGNORECASE)
 _QUATERNION = re.compile(r"(?P<stem>.*?)(?P<part>(?<![a-z])q[._]?[xyzw]|[._ /]?[xyzw])", re.I)
 _OF_ATTITUDE = re.compile(r"quat|orient|rot|attitude|(^|[^a-z])q$", re.IGNORECASE)
 _VECTOR = re.compile(r"(?P<stem>.*?)(?P<part>(?<![a-z])r[._]?[xyz]|[._ /]?[xyz])", re.IGNORECASE)

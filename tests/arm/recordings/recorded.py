@@ -18,7 +18,7 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
-from prior_reinforce.arm.recordings import ImportResult, Preprocessing
+from prior_reinforce.arm.recordings import ImportResult, Preprocessing, Recording
 
 AS_IS = Preprocessing(trim=False)
 N = 6
@@ -327,3 +327,13 @@ def write_bags(folder: Path, *, kind: str, count: int = N, **options: object) ->
     for i in range(count):
         write_bag(folder / f"throw{i}{'.bag' if kind == 'ros1' else ''}", i, kind=kind, **options)
     return folder
+
+
+def takes(
+    names: Sequence[str], *ends: Sequence[float] | np.ndarray, units: Sequence[tuple] = ()
+) -> list[Recording]:
+    """One take of 1 s for each row of numbers that its channels end at, from half of these."""
+    t = np.arange(100) * 0.01
+    s = 0.5 + 0.5 * np.linspace(0, 1, 100)[:, None]
+    every = enumerate(zip(ends, units or [()] * len(ends), strict=True))
+    return [Recording(f"t{i}", t, s * np.array(end), names, units=u) for i, (end, u) in every]

@@ -1,74 +1,10 @@
-"""Units are judged of each take and each channel on its own, and the odd ones are named."""
+"""Units are judged of each channel on its own, by its name and its numbers."""
 
-import numpy as np
 import pytest
 
-from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.selection import select
-from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
-
-T = np.arange(100) * 0.01
-
-
-def takes(names, *ends, units=()):
-    """One take for each row of numbers that its channels end at, from half of these."""
-    s = 0.5 + 0.5 * np.linspace(0, 1, 100)[:, None]
-    return [Recording(f"t{i}", T, s * np.array(end), names, units=u) for i, (end, u) in
-            enumerate(zip(ends, units or [()] * len(ends), strict=True))]  # fmt: skip
-
-
-ARM = ("shoulder", "elbow", "wrist")
-RAD = np.array([0.4, -1.6, 0.1])
-
-
-@pytest.mark.parametrize("robot", [None, ["rad"] * 3])
-def test_one_take_in_degrees_is_named_and_not_taken_for_all(robot):
-    some = takes(ARM, RAD, RAD * 1.1, RAD * 180 / np.pi, RAD * 0.9)
-    (asked,) = select(some, plan_units=robot).ambiguities
-    assert "elbow of t2 reaches 91.67, and of the others 1.76 at most" in asked.what
-    assert asked.option == "--leave-out t2"
-    assert "elbow of t2 reaches" in select(some, plan_units=robot, units=["deg"]).remarks[0]
-    assert not select([r for r in some if r.episode != "t2"], plan_units=robot).ambiguities
-
-
-def test_one_take_in_radians_among_degrees_is_named_beside_the_unit_of_the_rest():
-    some = takes(ARM, RAD, *[RAD * 180 / np.pi * k for k in (1, 1.1, 0.9)])
-    options = [one.option for one in select(some).ambiguities]
-    assert options == ["--leave-out t0", "--units deg"]
-
-
-def test_a_gripper_in_percent_in_one_take_only_is_named():
-    some = takes(("elbow", "gripper"), (1, 0.8), (1, 0.9), (1, 80))
-    (asked,) = select(some).ambiguities
-    assert asked.option == "--leave-out t2"
-
-
-def test_takes_that_are_smaller_by_far_less_than_a_unit_are_no_question():
-    assert not select(takes(ARM, RAD, RAD / 5, RAD * 2)).ambiguities
-    options = [one.option for one in select(takes(ARM, RAD * 50, RAD * 4, RAD * 60)).ambiguities]
-    assert options == ["--units deg"]
-
-
-def test_each_file_is_converted_by_the_unit_that_it_states():
-    some = takes(("j1", "lift"), (1, 200), (1, 210), (1, 0.2),
-                 units=[(None, "mm"), (None, "mm"), (None, "m")])  # fmt: skip
-    found = select(some)
-    assert not found.ambiguities
-    assert [r.positions[-1, 1] for r in found.recordings] == pytest.approx([0.2, 0.21, 0.2])
-    assert found.remarks == (
-        "lift is in mm in t0 to t1, in m in t2, as they state: each is converted",
-    )
-    with pytest.raises(InvalidDemonstrationsError, match="lift is in mm in t0, but in deg in t1"):
-        select(takes(("j", "lift"), (1, 9), (1, 9), units=[(None, "mm"), (None, "deg")]))
-
-
-def test_a_file_that_states_no_unit_where_others_do_is_asked_about():
-    some = takes(("j1", "lift"), (1, 200), (1, 210), (1, 0.2),
-                 units=[(None, "mm"), (None, "mm"), (None, None)])  # fmt: skip
-    (asked,) = select(some).ambiguities
-    assert "lift is in mm in t0 to t1 (up to 210), and t2 states no unit (up to 0.2)" in asked.what
-    assert asked.option == "--leave-out t2"
-    assert "lift of t2 reaches 0.2" in select(some, units=["rad", "mm"]).remarks[0]
+from prior_reinforce.errors import ConfigurationError
+from tests.arm.recordings.recorded import takes
 
 
 @pytest.mark.parametrize(
@@ -109,6 +45,33 @@ def test_an_axis_that_may_slide_is_not_taken_in_degrees_with_the_joints():
 
 def test_more_than_a_hundred_percent_is_refused_with_both_numbers():
     some = takes(("j1", "robotiq_pos"), (1, 220))
-    with pytest.raises(ConfigurationError, match=r"reaches 220 in t0, .*a range has 100"):
+    with pytest.raises(ConfigurationError, match=r"robotiq_pos of t0 reaches 220, .*range has 100"):
         select(some, units=["rad", "percent"])
     assert select(some, units=["rad", "counts"]).units == ("rad", "counts")
+
+
+def test_one_unit_for_all_is_not_taken_for_what_cannot_be_in_it():
+    """A quaternion beside joints in degrees stays a quaternion."""
+    names = ("j1", "j2", "qx", "qy", "qz", "qw")
+    found = select(takes(names, (40, -90, 0, 0, 0.6, 0.8)), units=["deg"])
+    assert (found.units, found.ambiguities) == (("rad", "rad", "1", "1", "1", "1"), ())
+
+
+def test_coordinates_of_one_place_are_in_one_unit():
+    (asked,) = select(takes(("x", "y", "z", "j1"), (450, 0.5, 3, 1))).ambiguities
+    assert asked.option == "--units mm mm mm rad"
+    assert "x, y, z in m would reach 450 (x of t0), which no arm does: it looks like mm" in (
+        asked.what
+    )
+
+
+def test_what_no_arm_does_is_asked_about_beside_a_quaternion_too():
+    names = ("j1", "j2", "qx", "qy", "qz", "qw")
+    (asked,) = select(takes(names, (60, -90, 0, 0, 0.6, 0.8)), units=["rad"]).ambiguities
+    assert asked.option == "--units deg deg 1 1 1 1"
+
+
+def test_an_angle_that_is_stated_in_degrees_is_not_doubted_with_others():
+    found = select(takes(("j1", "j2"), (40, 53), units=[("deg", None)]))
+    assert (found.recorded_units, found.remarks) == (("deg", "deg"), ())
+    assert [one.option for one in found.ambiguities] == ["--units deg"]

@@ -9,11 +9,9 @@ from prior_reinforce.arm.recordings.units import (
     SECONDS,
     Ambiguity,
     conversion,
-    is_no_angle,
     is_possible,
     judge_unit,
     known_unit,
-    place_names,
     raise_if_ambiguous,
     say_names,
     split_unit,
@@ -39,6 +37,8 @@ from prior_reinforce.errors import ConfigurationError, UnclearUnitsError
         ("liftMm", "lift", "mm"),
         ("q_min", "q_min", None),
         ("elbowRadius", "elbowRadius", None),
+        ("base_turn", "base_turn", None),
+        ("base [rev]", "base", "rev"),
     ],
 )
 def test_a_unit_that_stands_in_a_channels_name(column, name, unit):
@@ -118,18 +118,3 @@ def test_many_names_are_few_words():
 def test_what_no_arm_can_do_whoever_says_it(unit, reach, cannot):
     assert is_possible(unit, reach) is not cannot
     assert is_possible("counts", 1e9)
-
-
-def test_places_and_joints_are_told_apart_by_what_x_and_y_are_of():
-    assert place_names(["x", "y", "z"]) == {"x", "y", "z"}
-    assert place_names(["tool.x", "tool.y", "q1"]) == {"tool.x", "tool.y"}
-    for joints in (["hip_x", "hip_y", "hip_z"], ["tool_rot_x", "tool_rot_y"], ["rx", "ry", "rz"]):
-        assert not place_names(joints)
-
-
-def test_a_joint_is_an_angle_whatever_stands_before_its_name():
-    assert not is_no_angle("gripper_yaw")
-    assert not is_no_angle("current_elbow")
-    assert is_no_angle("pressure")
-    assert split_unit("base_turn", CHANNEL_UNITS) == ("base_turn", None)
-    assert split_unit("base [rev]", CHANNEL_UNITS) == ("base", "rev")

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from prior_reinforce.arm.recordings.bounds import check_names
+from prior_reinforce.arm.recordings.channels import one_for_all
 from prior_reinforce.arm.recordings.clock import (
     COUNTER,
     NO_COLUMN,
@@ -42,7 +43,6 @@ from prior_reinforce.arm.recordings.units import (
     SECONDS,
     Ambiguity,
     known_unit,
-    one_for_all,
     say_names,
 )
 from prior_reinforce.arm.robots.limits import says_no_position

@@ -8,7 +8,6 @@ one episode a file, with `observations/qpos`. An array a joint is taken by its p
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 import re
 from functools import partial
@@ -50,17 +49,14 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         with named_damage(path, "HDF5"), h5py.File(path, "r") as file:
             data = _own(path, file, "data")
             top = data if isinstance(data, h5py.Group) else file
-            made_by = json.loads(top.attrs.get("env_args", "{}")).get("env_kwargs", {})
             episodes = [name for name in top if top is not file or _EPISODE.fullmatch(name)]
             for within in sorted(episodes, key=natural_order) or [""]:
                 of_file = [path.stem] if len(paths) > 1 or not within else []
                 name = "-".join(filter(None, [*of_file, within]))
-                yield name, partial(_demo, path, top, within, made_by, options, name)
+                yield name, partial(_demo, path, top, within, options, name)
 
 
-def _demo(
-    path: Path, top: Any, within: str, made_by: Any, options: ReadOptions, episode: str
-) -> Recording:
+def _demo(path: Path, top: Any, within: str, options: ReadOptions, episode: str) -> Recording:
     with named_damage(path, "HDF5"):
         group = _own(path, top, within)
         keys = options.key or tuple(k for k in _KEYS if _own(path, group, k) is not None)[:1]
@@ -78,7 +74,6 @@ def _demo(
             if (own[0] == count and len(own) == 1) or may_move(name, math.prod(own[1:]))
         } | arrays
         texts, stated = _said(path, top, group, key)
-        stated |= {n: np.asarray(v) for n, v in made_by.items() if isinstance(v, (int, float))}
         declared = int(stated.get("num_samples", count))
     if declared > count:
         raise FileFormatError(

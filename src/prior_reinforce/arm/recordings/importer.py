@@ -17,7 +17,6 @@ from typing import Any
 from prior_reinforce.arm.recordings import csv, hdf5, lerobot, npz, ros, zarr
 from prior_reinforce.arm.recordings.bounds import check_numbers
 from prior_reinforce.arm.recordings.inspection import Inspection, inspect
-from prior_reinforce.arm.recordings.judging import doubts_of_times
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.outcome_units import in_units
 from prior_reinforce.arm.recordings.outcomes import (
@@ -34,6 +33,7 @@ from prior_reinforce.arm.recordings.preview import Preview
 from prior_reinforce.arm.recordings.recording import Episodes, Recording, has_files, refuse_pointers
 from prior_reinforce.arm.recordings.selection import Selection, select
 from prior_reinforce.arm.recordings.starts import check_outcomes, ways_back
+from prior_reinforce.arm.recordings.takes import doubts_of_times
 from prior_reinforce.arm.recordings.units import Ambiguity, listed, raise_if_ambiguous
 from prior_reinforce.arm.robots import GateSettings, RobotLimits
 from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidDemonstrationsError

@@ -1,40 +1,34 @@
-"""Units of the selected channels: each take's as it states them, else as its numbers look.
+"""Units of the selected channels: what is believed of each, what makes it doubtful, what is asked.
 
-Takes are judged each on its own, and channels by their names and numbers: nothing is converted by
-what another take states, or another channel looks like.
+A channel is in the unit that is stated for it, else in the plan's. Rules doubt that by its name and
+its largest number; the first that applies says what the numbers look like, and why. What nobody
+stated is asked about. What somebody stated is believed where an arm can do it, and remarked on.
 """
 
 from __future__ import annotations
 
-import math
-import shlex
-from collections.abc import Sequence
-from dataclasses import replace
-from typing import Literal
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal, NamedTuple
 
 import numpy as np
 
+from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.naming import vectors
 from prior_reinforce.arm.recordings.recording import Recording
-from prior_reinforce.arm.recordings.units import (
-    Ambiguity,
-    is_no_angle,
-    is_possible,
-    judge_unit,
-    may_be_length,
-    odd_takes,
-    place_names,
-    say_names,
-    says_angle,
-)
-from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
+from prior_reinforce.arm.recordings.units import Ambiguity, is_possible, judge_unit, say_names
+from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.whole_turns import TURN
-from prior_reinforce.units import base_of, factor
+from prior_reinforce.units import base_of
 
 UNIT = "UNIT"
 """What stands for a unit that only the user knows, in an option to complete."""
+Given = Literal["", "one for all", "each"]
+"""How --units gives the recorded units; empty where it does not."""
 _MOST_PERCENT = 110.0
 """Percent of a range; ours: calibrations overshoot by a few."""
+_NOT_DONE, _HARDLY = "which no arm does", "which is hardly a motion"
 _NORMALISED = (
     ", unless LeRobot recorded shares of each joint's range (-100 to 100, where use_degrees is "
     "unset): those are no angles; record with use_degrees, or import them as percent into a "
@@ -42,263 +36,235 @@ _NORMALISED = (
 )
 
 
-def in_one_unit(
+@dataclass(frozen=True, eq=False)
+class Belief:
+    """What is believed of one channel."""
+
+    name: str
+    kind: Kind
+    stated: str | None
+    """Unit that --units gives, or a file states; None where nobody does."""
+    wanted: str
+    """Unit in the plan."""
+    reach: Mapping[str, float]
+    """Largest number of each take, by its name."""
+
+    @property
+    def unit(self) -> str:
+        """Unit that it is taken to be in."""
+        return self.stated or self.wanted
+
+    @cached_property
+    def largest(self) -> float:
+        """Largest number of all takes."""
+        return max(self.reach.values())
+
+    @property
+    def where(self) -> str:
+        """Which channel of which take has that number: `elbow of throw_2`."""
+        return f"{self.name} of {max(self.reach, key=lambda take: self.reach[take])}"
+
+    def without(self, takes: Collection[str]) -> Belief:
+        """Return what is believed by the other takes; of all if there are no others."""
+        kept = {take: most for take, most in self.reach.items() if take not in takes}
+        return replace(self, reach=kept or self.reach)
+
+
+class Doubt(NamedTuple):
+    """What makes a unit doubtful."""
+
+    looks: str
+    """Unit that the numbers look like; `UNIT` where that cannot be said."""
+    why: str
+    """What speaks against the unit as it is believed: a clause."""
+    asked: bool = False
+    """Whether it is asked about even where somebody stated the unit."""
+
+
+def beliefs_of(
     recordings: Sequence[Recording],
     names: Sequence[str],
-    by_file: Sequence[Sequence[str | None]],
-    said: Sequence[str | None],
-    given: bool,
-) -> tuple[list[Recording], list[str], list[Ambiguity]]:
-    """Recordings in the unit `said`, each converted by what its own file states.
+    stated: Sequence[str | None],
+    plan_units: Sequence[str] | None,
+) -> list[Belief]:
+    """Return what is believed of each channel, whose plan is in its base unit if nobody says."""
+    reach = np.array([np.abs(r.positions).max(axis=0) for r in recordings])
+    takes = [r.episode for r in recordings]
+    beliefs = []
+    for i, (name, kind, said) in enumerate(zip(names, kinds(names), stated, strict=True)):
+        usual = base_of(said or kind.usual_unit(reach[:, i].max()))[0]
+        wanted = plan_units[i] if plan_units else usual
+        own = dict(zip(takes, reach[:, i].tolist(), strict=True))
+        beliefs.append(Belief(name, kind, said, wanted, own))
+    return beliefs
 
-    With a remark on what was in several units, and a doubt on each channel whose unit some files
-    state and others do not, unless it is `given`.
-    """
-    scale = np.ones((len(recordings), len(names)))
-    remarks, doubts = [], []
-    for i, name in enumerate(names):
-        of_unit: dict[str | None, list[int]] = {}
-        for k, units in enumerate(by_file):
-            of_unit.setdefault(units[i], []).append(k)
-        called = {u: _episodes(recordings, own) for u, own in of_unit.items()}
-        stating = [unit for unit in of_unit if unit is not None]
-        for unit in stating:
-            there = factor(unit, said[i] or unit)
-            if there is None:
-                raise InvalidDemonstrationsError(
-                    f"{name} is in {stating[0]} in {called[stating[0]]}, but in {unit} in "
-                    f"{called[unit]}; correct what is wrong, or leave it out (--leave-out)"
+
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """The rules that doubt what is believed of a recording's channels."""
+
+    beliefs: Sequence[Belief]
+    given: Given
+    silent: bool
+    """Whether no file states a unit."""
+    fixed: bool
+    """Whether the plan says its units."""
+    normalised: bool
+    """Whether the recorder also writes shares of each joint's range, -100 to 100."""
+
+    @cached_property
+    def angles(self) -> list[Belief]:
+        """Channels that are believed to be angles."""
+        return [one for one in self.beliefs if one.unit in TURN and one.kind is not Kind.TOOL]
+
+    @cached_property
+    def places(self) -> list[Belief]:
+        """Coordinates, which are all in one unit."""
+        return [one for one in self.beliefs if one.unit == "m" and one.kind is Kind.PLACE]
+
+    @cached_property
+    def far(self) -> list[Belief]:
+        """Angles that are in degrees, not in radians as believed, and those that share their unit.
+
+        Joints of one recorder have one unit, unless few of them only are out of range: then those
+        that are numbered like these.
+        """
+        far = [one for one in self.angles if self._looks(one) not in (one.unit, None)]
+        near = max((one.largest for one in self.angles if one not in far), default=0.0)
+        together = self.fixed or self.given or 2 * len(far) > len(self.angles)
+        if far and (together or near > TURN["rad"]):
+            return self.angles
+        groups = vectors([one.name for one in self.beliefs]).values()
+        numbered = [{self.beliefs[i] for i in group} for group in groups]
+        alike = {one for group in numbered if not group.isdisjoint(far) for one in group}
+        return [one for one in self.angles if one in far or one in alike]
+
+    def _looks(self, one: Belief) -> str | None:
+        """The unit that a channel's numbers look like."""
+        most = max(each.largest for each in (self.places if one in self.places else [one]))
+        return judge_unit(one.unit, most, opening=one.kind is Kind.TOOL)
+
+    def _doubt(self, one: Belief) -> Doubt | None:
+        """What makes a unit doubtful, by the first rule that applies; None if none does."""
+        rules = self._may_slide, self._is_no_angle, self._hardly_moves, self._is_beyond
+        return next(filter(None, (rule(one) for rule in rules)), None)
+
+    def _may_slide(self, one: Belief) -> Doubt | None:
+        """A rail or an external axis is not in degrees only for being among angles that are."""
+        among = one in self.far
+        if self.given:
+            among = self.given == "one for all" and self.silent
+        slides = one.kind is Kind.SLIDE and one.unit in TURN and one.largest > 0
+        why = "and its name leaves open if it turns or slides"
+        return Doubt(UNIT, why, asked=True) if slides and among and not self.fixed else None
+
+    def _is_no_angle(self, one: Belief) -> Doubt | None:
+        """What turns too far is none: a gripper, or a name without meaning beside joints."""
+        beside = one in self.far and len(self.far) < len(self.angles)
+        unnamed = beside and one.kind not in (Kind.ANGLE, Kind.ROTATION)
+        none = one.kind is Kind.TOOL or unnamed
+        if one.stated or one.unit not in TURN or not none or self._looks(one) == one.unit:
+            return None
+        why = f"beside joints in {one.unit}" if beside else "by its name"
+        return Doubt("percent" if one.largest <= 100 else UNIT, f"and {why} it is no angle")
+
+    def _hardly_moves(self, one: Belief) -> Doubt | None:
+        """Joints that are all said to be in degrees, and stay within 6.28 of them, are not."""
+        said = self.given == "one for all" and self.silent and one in self.angles
+        small = all(angle.unit == "deg" and angle.largest < TURN["rad"] for angle in self.angles)
+        return Doubt("rad", _HARDLY, asked=True) if said and small else None
+
+    def _is_beyond(self, one: Belief) -> Doubt | None:
+        """A number beyond what arms do is in another unit; an angle with those that share it."""
+        looks, why = self._looks(one), _NOT_DONE
+        if looks == one.unit:
+            return Doubt("deg", why) if one in self.far and looks != "deg" else None
+        if one.unit == "percent":
+            why = _HARDLY if looks else "which no share of a range does"
+            if self.given and self.silent and one.stated and one.largest > _MOST_PERCENT:
+                raise ConfigurationError(
+                    f"{one.where} reaches {one.largest:.4g}, and --units says percent, of which a "
+                    "range has 100: say its own unit, or counts for a number without a unit"
                 )
-            scale[of_unit[unit], i] = there
-        each = ", ".join(f"in {unit} in {called[unit]}" for unit in stating)
-        if len(stating) > 1:
-            remarks.append(f"{name} is {each}, as they state: each is converted")
-        if stating and None in of_unit and not given:
-            silent, others = of_unit[None], [k for unit in stating for k in of_unit[unit]]
-            here, there = (
-                max(float(np.abs(recordings[k].positions[:, i]).max()) for k in group)
-                for group in (silent, others)
-            )
+        return Doubt(looks or UNIT, why)
+
+    @cached_property
+    def _one_option(self) -> bool:
+        """Whether --units could give one unit for all, and contradicts no file.
+
+        Quaternions and matrices, which have none, are let alone.
+        """
+        pure = (Kind.QUATERNION, Kind.MATRIX)
+        units = {one.unit for one in self.beliefs if one.stated or one.kind not in pure}
+        return self.silent and len(units) == 1
+
+    @cached_property
+    def _doubts(self) -> dict[Belief, Doubt]:
+        """Every doubt, and whether it is asked about: nobody stated the unit, or a wrong one."""
+        doubts = {}
+        for one in self.beliefs:
+            if doubt := self._doubt(one):
+                alike = self.far if one in self.far else [one]
+                possible = all(is_possible(one.unit, each.largest) for each in alike)
+                wrong = bool(self.given) and self._one_option and not possible
+                asked = one.stated is None or doubt.asked or (wrong and doubt.looks != UNIT)
+                doubts[one] = doubt._replace(asked=asked)
+        return doubts
+
+    @cached_property
+    def _answers(self) -> dict[Belief, str]:
+        """Unit of each channel, as it looks where that is asked about."""
+        asked = {one: doubt.looks for one, doubt in self._doubts.items() if doubt.asked}
+        return {one: asked.get(one, one.unit) for one in self.beliefs}
+
+    def recorded(self) -> list[str]:
+        """Unit of each channel; the plan's where its own cannot be told, or is of another kind."""
+        return [
+            unit
+            if unit != UNIT and (one.stated or base_of(unit)[0] == base_of(one.wanted)[0])
+            else one.wanted
+            for one, unit in self._answers.items()
+        ]
+
+    def _groups(self, *, asked: bool) -> Iterator[tuple[str, Doubt, list[Belief], Belief]]:
+        """Channels whose units are doubted alike, and of these the one with the largest number."""
+        groups: dict[tuple[str, Doubt], list[Belief]] = {}
+        for one, doubt in self._doubts.items():
+            if doubt.asked == asked:
+                groups.setdefault((one.unit, doubt), []).append(one)
+        for (unit, doubt), among in groups.items():
+            yield unit, doubt, among, max(among, key=lambda one: one.largest)
+
+    def questions(self) -> list[Ambiguity]:
+        """Ask about units, one question for what looks alike, all with one option."""
+        units = list(self._answers.values())
+        option = f"--units {' '.join(units if len({*units}) > 1 else units[:1])}"
+        by = ", as --units says," if self.given else ""
+        questions = []
+        for unit, doubt, among, worst in self._groups(asked=True):
+            seen = f"it looks like {doubt.looks}"
+            if doubt.looks == UNIT:
+                seen = f"put its unit in the place of {UNIT}"
+            elif doubt.looks == "deg" and self.normalised and worst.largest <= 100:
+                seen += _NORMALISED
             what = (
-                f"{name} is {each} (up to {there:.4g}), and {called[None]} states no unit (up to "
-                f"{here:.4g}): state it there, or leave out"
+                f"{say_names([one.name for one in among])} in {unit}{by} would reach "
+                f"{worst.largest:.4g} ({worst.where}), {doubt.why}: {seen}"
             )
-            fewer = silent if len(silent) <= len(others) else others
-            doubts.append(_without_takes(what, [recordings[k].episode for k in fewer]))
-    scaled = [
-        replace(r, positions=r.positions * by) if np.any(by != 1) else r
-        for r, by in zip(recordings, scale, strict=True)
-    ]
-    return scaled, remarks, doubts
+            questions.append(Ambiguity(what, option, UNIT not in units))
+        return questions
 
-
-def _episodes(recordings: Sequence[Recording], chosen: Sequence[int]) -> str:
-    return say_names([recordings[k].episode for k in chosen])
-
-
-def _without_takes(what: str, episodes: Sequence[str]) -> Ambiguity:
-    """A doubt that leaving some takes out settles."""
-    return Ambiguity(what, f"--leave-out {shlex.join(episodes)}", guessed=False)
-
-
-def doubts_of_times(recordings: Sequence[Recording]) -> list[Ambiguity]:
-    """What is only guessed of the times, one doubt for each option.
-
-    Where some takes only are in another unit, the fewer are to be left out: no option holds for
-    all.
-    """
-    found = {one.option: one for r in reversed(recordings) for one in r.ambiguities}
-    for option, doubt in list(found.items()):
-        asked = [r.episode for r in recordings if option in [one.option for one in r.ambiguities]]
-        others = [r.episode for r in recordings if r.episode not in asked]
-        if not option.startswith("--time-unit") or not others:
-            continue
-        what = (
-            f"{say_names(asked)}: {doubt.what}, but {say_names(others)} would not be in that "
-            "unit: convert what is in another one than the rest, or leave it out"
-        )
-        fewer = asked if len(asked) <= len(others) else others
-        if fewer is asked:
-            del found[option]
-        alone = _without_takes(what, fewer)
-        found[alone.option] = alone
-    return list(found.values())
-
-
-def odd_episodes(
-    recordings: Sequence[Recording],
-    names: Sequence[str],
-    by_file: Sequence[Sequence[str | None]],
-    said: Sequence[str | None],
-    given: bool,
-) -> tuple[set[str], list[Ambiguity]]:
-    """Takes that are in another unit than the others by their numbers, and doubts that name them.
-
-    Angles are judged together and lengths together, a gripper by itself.
-    """
-    places = place_names(names)
-    units = [unit or ("m" if n in places else "rad") for n, unit in zip(names, said, strict=True)]
-    silent = any if given else all  # else what only some state is asked about anyway
-    open_ = [i for i in range(len(names)) if silent(own[i] is None for own in by_file)]
-    tools = [i for i in open_ if is_no_angle(names[i])]
-    arms = [i for i in open_ if i not in tools]
-    groups = [("rad", [i for i in arms if units[i] in TURN])]
-    groups += [("m", [i for i in arms if base_of(units[i])[0] == "m"])]
-    groups += [("", [i]) for i in tools]
-    reach = np.array([np.abs(r.positions).max(axis=0) for r in recordings])
-    odd: dict[tuple[str, ...], list[str]] = {}
-    for kind, among in groups:
-        if not among:
-            continue
-        most = reach[:, among].max(axis=1)
-        found = odd_takes(most.tolist(), kind)
-        if not found:
-            continue
-        usual = [k for k in range(len(recordings)) if k not in found]
-        worst = found[int(np.argmax(most[found]))]
-        where = names[among[int(np.argmax(reach[worst, among]))]]
-        apart = max(most[worst] / most[usual].max(), most[usual].max() / most[worst])
-        what = (
-            f"{where} of {recordings[worst].episode} reaches {most[worst]:.4g}, and of the others "
-            f"{most[usual].max():.4g} at most, {apart:.3g} times apart"
-        )
-        episodes = tuple(recordings[k].episode for k in found)
-        odd.setdefault(episodes, []).append(what)
-    doubts = [
-        _without_takes(
-            f"{'; '.join(whats)}: {say_names(episodes)} may be in another unit; convert what is, "
-            "or leave it out",
-            episodes,
-        )
-        for episodes, whats in odd.items()
-    ]
-    return {name for episodes in odd for name in episodes}, doubts
-
-
-def _of_one_unit(
-    names: Sequence[str],
-    units: Sequence[str],
-    most: np.ndarray,
-    angles: list[int],
-    *,
-    together: bool,
-) -> list[int]:
-    """Angles that are in another unit than they are said to be, with those that share their unit.
-
-    Joints of one recorder have one unit (`together`), unless few of them only are out of range:
-    then those that are numbered like these.
-    """
-    far = [i for i in angles if judge_unit(units[i], most[i]) not in (units[i], None)]
-    near = max((most[i] for i in angles if i not in far), default=math.inf)
-    if far and (together or 2 * len(far) > len(angles) or near > TURN["rad"]):
-        return angles
-    alike = [{i, *g} for i in far for g in vectors(names).values() if i in g]
-    return [i for i in angles if i in far or any(i in group for group in alike)]
-
-
-def judge_units(
-    recordings: Sequence[Recording],
-    names: Sequence[str],
-    said: Sequence[str | None],
-    wanted: Sequence[str],
-    *,
-    given: Literal["no", "one for all", "each"],
-    open_: bool,
-    normalised: bool,
-    fixed: bool,
-) -> tuple[list[str], list[Ambiguity], list[str], str]:
-    """Infer the unit of each channel: as stated if possible, else as wanted, else as it looks.
-
-    `said` are units given or from the file, and `given` how they were given: believed where they
-    are possible. `open_`: the files state none. `fixed`: the plan says its units.
-
-    Returns units, what is ambiguous of them, remarks, and `Selection.other_unit`.
-    """
-    reach = np.array([np.abs(r.positions).max(axis=0) for r in recordings])
-    most = reach.max(axis=0)
-    recorded = [unit or w for unit, w in zip(said, wanted, strict=True)]
-    for i, unit in enumerate(recorded):
-        if unit == "percent" and said[i] and given != "no" and open_ and most[i] > _MOST_PERCENT:
-            where = recordings[int(np.argmax(reach[:, i]))].episode
-            raise ConfigurationError(
-                f"{names[i]} reaches {most[i]:.4g} in {where}, and --units says percent, of which "
-                "a range has 100: say its own unit, or counts for a number without a unit"
-            )
-    angles = [i for i, unit in enumerate(recorded) if unit in TURN and not is_no_angle(names[i])]
-    small = given == "one for all" and open_ and {recorded[i] for i in angles} == {"deg"}
-    small = small and most[angles].max() < TURN["rad"]
-    far = _of_one_unit(names, recorded, most, angles, together=fixed or given != "no")
-    lengths = place_names(names)  # of one recorder, in one unit
-    places = [i for i, unit in enumerate(recorded) if unit == "m" and names[i] in lengths]
-    groups: dict[tuple[str, str | None, str], list[int]] = {}
-    doubtful, other = dict[tuple[str, str], int](), ""
-    single = len(set(recorded)) == 1
-    for i, unit in enumerate(recorded):
-        number = max(most[j] for j in places) if i in places else most[i]
-        looks, why = judge_unit(unit, number, opening=is_no_angle(names[i])), "which no arm does"
-        if unit == "percent":
-            why = "which is hardly a motion" if looks else "which no share of a range does"
-        alone = i in far and len(far) < len(angles) and not fixed
-        tool = is_no_angle(names[i])
-        slides = may_be_length(names[i]) and unit in TURN and not fixed and most[i] > 0
-        slides = slides and (given == "one for all" and open_ if given != "no" else i in far)
-        if slides:
-            looks, why = None, "and its name leaves open if it turns or slides"
-        elif unit in TURN and looks != unit and said[i] is None and (tool or alone):
-            why = f"beside joints in {unit}" if alone else "by its name"
-            if alone and says_angle(names[i]):
-                looks, why = "deg", "which no arm does"
-            else:
-                looks, why = "percent" if most[i] <= 100 else None, f"and {why} it is no angle"
-        elif small and i in angles:
-            looks, why = "rad", "which is hardly a motion"
-        elif looks == unit and i in far:
-            looks = "deg"
-        elif looks == unit:
-            continue
-        alike = far if i in far else [i]
-        impossible = open_ and single and not all(is_possible(unit, most[j]) for j in alike)
-        if (
-            said[i] is None
-            or slides
-            or (small and i in angles)
-            or (given != "no" and impossible and looks)
-        ):
-            groups.setdefault((unit, looks, why), []).append(i)
-        elif looks is not None:
-            worst = doubtful.setdefault((unit, looks), i)
-            doubtful[unit, looks] = i if most[i] > most[worst] else worst
-    remarks = []
-    for (unit, looks), i in doubtful.items():
-        where = f"{names[i]} of {recordings[int(np.argmax(reach[:, i]))].episode}"
-        other = f"--units {looks}" if open_ and single else other
-        advice = f"if it was recorded in {looks}, say {other}" if other else "check its unit"
-        remarks.append(f"{where} reaches {most[i]:.4g} {unit}, and arms do not: {advice}")
-    unclear = []
-    for (unit, looks, why), among in groups.items():
-        worst = among[int(np.argmax(most[among]))]
-        episode = recordings[int(np.argmax(reach[:, worst]))].episode
-        by = ", as --units says," if given != "no" else ""
-        seen = f"it looks like {looks}" if looks else f"put its unit in the place of {UNIT}"
-        if looks == "deg" and normalised and most[among].max() <= 100:
-            seen += _NORMALISED
-        called = say_names([names[i] for i in among])
-        reaches = f"would reach {most[worst]:.4g} ({names[worst]} of {episode})"
-        unclear.append(f"{called} in {unit}{by} {reaches}, {why}: {seen}")
-        for i in among:
-            recorded[i] = looks or UNIT
-    in_degrees = bool(angles) and {recorded[i] for i in angles} == {"deg"}
-    if given != "no" and normalised and in_degrees and not unclear and most[angles].max() <= 100:
-        remarks.append(f"degrees, as --units says{_NORMALISED}")
-    single = len(set(recorded)) == 1
-    option = f"--units {recorded[0] if single else ' '.join(recorded)}"
-    for i, unit in enumerate(wanted):
-        unlike = base_of(recorded[i])[0] != base_of(unit)[0] and said[i] is None
-        if recorded[i] == UNIT or unlike:
-            recorded[i] = unit  # asked about, and not converted
-    return (
-        recorded,
-        [Ambiguity(what, option, UNIT not in option) for what in unclear],
-        remarks,
-        other,
-    )
+    def remarks(self) -> tuple[list[str], str]:
+        """Remark on doubtful units that somebody stated; with the option for another, if any."""
+        remarks, other = [], ""
+        for unit, (looks, _, _), _, worst in self._groups(asked=False):
+            if looks != UNIT:
+                other = f"--units {looks}" if self._one_option else ""
+                said = f"if it was recorded in {looks}, say {other}" if other else "check its unit"
+                what = f"{worst.where} reaches {worst.largest:.4g} {unit}, and arms do not: {said}"
+                remarks.append(what)
+        degrees = bool(self.angles) and {*map(self._answers.get, self.angles)} == {"deg"}
+        shares = self.normalised and all(angle.largest <= 100 for angle in self.angles)
+        if self.given and degrees and shares and not self.questions():
+            remarks.append(f"degrees, as --units says{_NORMALISED}")
+        return remarks, other

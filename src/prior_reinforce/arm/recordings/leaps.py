@@ -11,8 +11,8 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 from jaxtyping import Float
 
+from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.recording import Recording
-from prior_reinforce.arm.recordings.units import is_no_angle
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.signals import noise
 from prior_reinforce.plans.whole_turns import HALF, TURN
@@ -84,8 +84,8 @@ def _leaps(recording: Recording, units: Sequence[str]) -> Iterator[tuple[list[in
         half = off < HALF * turns
         for frame in np.flatnonzero(half.sum(axis=1) > 1).tolist():
             yield [angles[i] for i in np.flatnonzero(half[frame])], frame
-    for i, name in enumerate(recording.names):
-        if is_no_angle(name) or ranges[i] == 0:
+    for i, kind in enumerate(kinds(recording.names)):
+        if kind is Kind.TOOL or ranges[i] == 0:
             continue
         for frame in np.flatnonzero(np.abs(steps[:, i]) >= _SHARE * ranges[i]).tolist():
             if _starts_again(q[:, i], frame) or _moves_on(t, q[:, i], frame, sigma[i]):

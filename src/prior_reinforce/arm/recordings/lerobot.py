@@ -10,6 +10,7 @@ of a recorder (0.4.4) that ended without `finalize()` has no footer, and cannot 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -20,6 +21,7 @@ from jaxtyping import Shaped
 
 from prior_reinforce.arm.recordings.beside import may_move, recorded_among
 from prior_reinforce.arm.recordings.bounds import check_bytes, check_numbers
+from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.clock import (
     NO_COLUMN,
     Clock,
@@ -37,7 +39,7 @@ from prior_reinforce.arm.recordings.recording import (
     Recording,
     named_damage,
 )
-from prior_reinforce.arm.recordings.units import is_no_angle, place_names, say_names
+from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.errors import FileFormatError
 
@@ -122,9 +124,9 @@ def _point_to_joints(
     """Raise FileFormatError naming the features of the joints, where the usual one has a place."""
     own = _names(features[key])
     missing = missing_channels(joints, own) if len(own) == widths[key] else []
-    if not missing or not place_names(own):
+    if not missing or Kind.PLACE not in kinds(own):
         return
-    counts = {len(joints), sum(not is_no_angle(joint) for joint in joints)}
+    counts = {len(joints), sum(kind is not Kind.TOOL for kind in kinds(joints))}
     others = [
         name
         for name, width in widths.items()
@@ -259,31 +261,26 @@ def _rows(column: Any) -> Positions:
 
 def _names(feature: Any) -> tuple[str, ...]:
     """Channel names in every form that writers give them; none where there are none."""
-    said = feature.get("names") if isinstance(feature, dict) else None
-    names = _flat(said)
+    found = list(_flat(feature.get("names") if isinstance(feature, dict) else None))
+    names = tuple(name for _, name in found)
     if len(set(names)) < len(names):  # two arms whose joints have one name each
-        names = _flat(said, "")
-    return tuple(names)
+        names = tuple(f"{group}{name}" for group, name in found)
+    return names
 
 
-def _flat(names: Any, group: str | None = None) -> list[str]:
-    """Names of a list, of `{name: index}` or `{index: name}`, or of groups of any of these.
-
-    With `group`, each name begins with the names of its groups.
-    """
-    if isinstance(names, list) and all(isinstance(name, str) for name in names):
-        return [f"{group}{name}" if group else name for name in names]
-    if isinstance(names, list):
-        return [name for part in names for name in _flat(part, group)]
-    if not isinstance(names, dict):
-        return []
-    numbers = sorted(map(str, range(len(names))))
-    if names and sorted(map(str, names)) == numbers:
-        return _flat([names[key] for key in sorted(names, key=int)], group)
-    if names and sorted(map(str, names.values())) == numbers:
-        return _flat(sorted(names, key=lambda name: int(names[name])), group)
-    return [
-        name
-        for key, part in names.items()
-        for name in _flat(part, None if group is None else f"{group}{key}.")
-    ]
+def _flat(said: Any, group: str = "") -> Iterator[tuple[str, str]]:
+    """Names, with their groups, of a list, `{name: index}`, `{index: name}`, or groups of these."""
+    if isinstance(said, dict):
+        numbers = sorted(map(str, range(len(said))))
+        if sorted(map(str, said)) == numbers:
+            said = [said[key] for key in sorted(said, key=int)]
+        elif sorted(map(str, said.values())) == numbers:
+            said = sorted(said, key=lambda name: int(said[name]))
+    if isinstance(said, str):
+        yield group, said
+    elif isinstance(said, list):
+        for part in said:
+            yield from _flat(part, group)
+    elif isinstance(said, dict):
+        for key, part in said.items():
+            yield from _flat(part, f"{group}{key}.")

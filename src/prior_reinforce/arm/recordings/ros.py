@@ -54,8 +54,8 @@ _OF_NO_JOINT = re.compile(
     r"|MagneticField|NavSatFix|Joy|BatteryState|Temperature)$"
 )
 """Types of messages that no lift or gripper sends: of ROS itself, places, cameras and the like."""
-_FOOTER, _MOST_SUMMARY = struct.Struct("<BQQQI8s"), 10_000_000
-"""The end of an MCAP, and bytes of the list of what is in it."""
+_MAGIC, _HEAD = b"\x89MCAP0\r\n", struct.Struct("<8sBQI")
+"""How an MCAP begins: these bytes, a record's kind and length, and the length of its first text."""
 _TIME = re.compile(r"builtin_interfaces/msg/(Time|Duration)|std_msgs/msg/Header")
 _MOST_BYTES = 2_000
 """Bytes of a message of a lift's or gripper's position at most. Ours: others are pictures."""
@@ -171,37 +171,17 @@ def _files_of(bag: Path) -> list[Path]:
 def _refuse_other_messages(path: Path) -> None:
     """Refuse an MCAP whose messages are not of ROS: JSON, for instance.
 
-    Its last part says so (mcap.dev/spec): a footer tells where the channels are listed.
+    Its first record says so (mcap.dev/spec): the length of a text and the text, `ros2`.
     """
-    found = set()
     if has_suffix(path, (".mcap",)) and path.is_file():
         with path.open("rb") as file:
-            file.seek(max(0, path.stat().st_size - _FOOTER.size))
-            end = file.read()
-            opcode, _, start, *_ = _FOOTER.unpack(end) if len(end) == _FOOTER.size else (0, 0, 0)
-            size = path.stat().st_size - start - _FOOTER.size
-            if opcode == 2 and start > 0 and 0 < size < _MOST_SUMMARY:
-                file.seek(start)
-                summary = file.read(size)
-                found = {*_encodings(summary)}
-    if found and not found & {"cdr", "ros1"}:
-        kinds = " and ".join(sorted(one.upper() for one in found))
-        raise FileFormatError(
-            f"{path}: its messages are {kinds}, and those of ROS alone are read; save their times, "
-            "joint names and positions as NPZ or CSV"
-        )
-
-
-def _encodings(summary: bytes) -> Iterator[str]:
-    """How the messages of each channel are written, from the records at the end of an MCAP."""
-    at = 0
-    while at + 9 <= len(summary):
-        opcode, length = struct.unpack_from("<BQ", summary, at)
-        record, at = summary[at + 9 : at + 9 + length], at + 9 + length
-        if opcode == 4 and len(record) >= 8:  # a channel: numbers of itself and its schema, topic
-            first = 8 + int.from_bytes(record[4:8], "little")
-            size = int.from_bytes(record[first : first + 4], "little")
-            yield record[first + 4 : first + 4 + size].decode(errors="replace")
+            magic, opcode, _, size = _HEAD.unpack(file.read(_HEAD.size).ljust(_HEAD.size))
+            profile = file.read(min(size, _HEAD.size)).decode(errors="replace")
+        if magic == _MAGIC and opcode == 1 and not profile.startswith("ros"):
+            raise FileFormatError(
+                f"{path}: its messages are not of ROS (JSON, for instance), and those alone are "
+                "read; save their times, joint names and positions as NPZ or CSV"
+            )
 
 
 def _numbers(topic: str, message: Any) -> Any:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from prior_reinforce.arm.recordings.beside import columns_beside
-from prior_reinforce.arm.recordings.judging import UNIT, in_one_unit, judge_units, odd_episodes
+from prior_reinforce.arm.recordings.channels import Kind, kinds, one_for_all
+from prior_reinforce.arm.recordings.judging import UNIT, Given, Judge, beliefs_of
 from prior_reinforce.arm.recordings.naming import (
     find_channels,
     joint_vectors,
@@ -18,20 +18,10 @@ from prior_reinforce.arm.recordings.naming import (
     numbered_like,
 )
 from prior_reinforce.arm.recordings.recording import Recording
-from prior_reinforce.arm.recordings.units import (
-    Ambiguity,
-    conversion,
-    is_no_angle,
-    known_unit,
-    listed,
-    matrix_names,
-    one_for_all,
-    place_names,
-    say_names,
-)
+from prior_reinforce.arm.recordings.takes import in_one_unit, odd_takes
+from prior_reinforce.arm.recordings.units import Ambiguity, conversion, listed, say_names
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
-from prior_reinforce.plans.whole_turns import TURN, attitudes
-from prior_reinforce.units import base_of
+from prior_reinforce.plans.whole_turns import TURN
 
 _MOST_LOST = 0.1
 """Share of an episode's frames that may be lost. Ours: lost packets come in bursts of some frames;
@@ -80,19 +70,9 @@ def select(
 ) -> Selection:
     """Pick, order, convert and rename the channels of every recording.
 
-    Frames with a value that is not finite are dropped, as lost packets are.
-
-    Args:
-        recordings: At least one.
-        joints: Recorded names to keep, in order, or of all columns where these have none; None
-            keeps those of the first recording.
-        names: Their names in the plan; None keeps the recorded names. If they equal `joints` and
-            no column has these names, as many numbered columns are a guess.
-        units: Recorded units; a single one holds for all channels that can be in it: degrees for
-            joints, not for a gripper in percent. None takes those that the recordings state, else
-            the plan's; if no arm reaches such values, the unit is guessed.
-        plan_units: Units of the plan; None takes rad for angles and what has none, m for lengths.
-        normalised: Whether the recorder also writes shares of each joint's range, -100 to 100.
+    Frames with a value that is not finite are dropped, as lost packets are. `joints` and `units`
+    are those of `ReadOptions`, `names` and `plan_units` those of `import_demonstrations`; with
+    `normalised`, the recorder also writes shares of each joint's range, -100 to 100.
 
     Raises:
         InvalidDemonstrationsError: A joint that a recording lacks, or too many lost frames.
@@ -104,10 +84,10 @@ def select(
     names = tuple(names) if names is not None else joints
     if not joints or len(set(joints)) != len(joints):
         raise ConfigurationError(f"joints must be names that differ, got {list(joints)}")
-    given: Literal["no", "one for all", "each"] = "no" if units is None else "each"
+    given: Given = "" if units is None else "each"
     stated: list[str | None] = [None] * len(joints) if units is None else [*units]
     if units is not None and len(units) == 1 < len(joints):
-        given, stated = "one for all", _spread(units[0], plan_units, names)
+        given, stated = "one for all", one_for_all(units[0], names, plan_units)
     if len(names) != len(joints) or len(stated) != len(joints):
         raise ConfigurationError(
             f"{len(joints)} joints need as many names and units, got {len(names)} names and "
@@ -124,40 +104,29 @@ def select(
             f"--units {UNIT} stands for the unit of {named}, which only you know: put deg, mm, "
             "percent, ... in its place, or counts for a number without a unit"
         )
-    by_file = [[r.units[i] for i in c] for r, c in zip(recordings, columns, strict=True)]
-    said = [_said_unit(recordings, columns, i, unit) for i, unit in enumerate(stated)]
     picked = [_picked(*each, joints) for each in zip(recordings, columns, strict=True)]
-    picked, mixed, unsaid = in_one_unit(picked, names, by_file, said, given != "no")
-    most = np.abs(np.concatenate([r.positions for r in picked])).max(axis=0)
-    no_angles = {name for group in attitudes(names) if len(group) == 4 for name in group}
-    no_angles |= matrix_names(names)
-    no_angles |= {n for n, m in zip(names, most, strict=True) if is_no_angle(n) and m <= 1}
-    lengths = place_names(names)
-    usual = ["1" if n in no_angles else "m" if n in lengths else "rad" for n in names]
-    wanted = [base_of(unit or own)[0] for unit, own in zip(said, usual, strict=True)]
-    wanted = wanted if plan_units is None else list(plan_units)
-    # No option may contradict a unit that the file states.
-    open_ = all(r.units[i] is None for r, c in zip(recordings, columns, strict=True) for i in c)
-    odd, doubts = odd_episodes(picked, names, by_file, said, given != "no")
-    kept = [r for r in picked if r.episode not in odd] or picked
-    recorded, unclear, remarks, other = judge_units(
-        kept,
-        names,
-        said,
-        wanted,
-        given=given,
-        open_=open_,
-        normalised=normalised,
-        fixed=plan_units is not None,
-    )
-    scale = [conversion(*one) for one in zip(recorded, wanted, names, strict=True)]
+    takes, stated, mixed, unsaid = in_one_unit(picked, names, stated)
+    beliefs = beliefs_of(takes, names, stated, plan_units)
+    told = [[r.units[i] is not None for r in picked] for i in range(len(names))]
+    # What some files state and others do not is asked about anyway, unless it is given.
+    open_ = [b for b, own in zip(beliefs, told, strict=True) if not (all if given else any)(own)]
+    odd, differ = odd_takes(open_)
+    silent, fixed = not any(map(any, told)), plan_units is not None
+    judge = Judge([b.without(odd) for b in beliefs], given, silent, fixed, normalised)
+    questions, (remarks, other) = judge.questions(), judge.remarks()
+    if given:
+        remarks = [*(doubt.what for doubt in differ), *remarks]
+    else:
+        questions = [*unsaid, *differ, *questions]
+    recorded, wanted = judge.recorded(), tuple(belief.wanted for belief in beliefs)
+    scale = [conversion(*each) for each in zip(recorded, wanted, names, strict=True)]
     return Selection(
-        tuple(replace(r, positions=r.positions * scale, units=tuple(wanted)) for r in picked),
+        tuple(replace(r, positions=r.positions * scale, units=wanted) for r in takes),
         names,
-        tuple(wanted),
+        wanted,
         tuple(recorded),
-        (*guessed, *unsaid, *(doubts if given == "no" else ()), *unclear),
-        (*mixed, *(doubt.what for doubt in doubts if given != "no"), *remarks),
+        (*guessed, *questions),
+        (*mixed, *remarks),
         other,
         _left_out(recordings, columns),
     )
@@ -167,22 +136,14 @@ def _refuse_places(
     joints: Sequence[str], names: Sequence[str], plan_units: Sequence[str] | None
 ) -> None:
     """ConfigurationError if recorded places are to be a plan's joints: `--joints x y z ...`."""
-    places, angles = place_names(joints), plan_units or [""] * len(names)
-    wrong = [j for j, unit in zip(joints, angles, strict=False) if j in places and unit in TURN]
+    each = zip(joints, names, kinds(joints), plan_units or [""] * len(names), strict=True)
+    wrong = [(j, n) for j, n, kind, unit in each if kind is Kind.PLACE and unit in TURN]
     if wrong:
-        called = [n for j, n in zip(joints, names, strict=True) if j in wrong]
+        places, called = zip(*wrong, strict=True)
         raise ConfigurationError(
-            f"{say_names(wrong)} are a place, and not the joints {say_names(called)}; name "
+            f"{say_names(places)} are a place, and not the joints {say_names(called)}; name "
             "recorded joints with --joints, or what holds them with --key"
         )
-
-
-def _spread(unit: str, plan_units: Sequence[str] | None, names: Sequence[str]) -> list[str | None]:
-    """One unit for all channels that can be in it, which no gripper or place is in degrees."""
-    base = base_of(unit)[0]
-    fits = [base_of(own)[0] == base for own in plan_units or (base,) * len(names)]
-    each = zip(one_for_all(unit, names), fits, strict=True)
-    return [own if fit or not any(fits) else None for own, fit in each]
 
 
 def _guess_names(
@@ -216,9 +177,9 @@ def _columns(recording: Recording, joints: tuple[str, ...], names: tuple[str, ..
         missing = say_names(missing_channels(joints, recording.names))
         fitting = list(joint_vectors(recording.names, len(joints)))
         by_key = f", or numbered columns at once: --key {fitting[0]}" if fitting else ""
-        places = place_names(recording.names)
-        others = {*recording.names} - {n for g in attitudes(recording.names) for n in g} - places
-        if places and len(others) < len(joints) and not fitting:
+        of_kind = kinds(recording.names)
+        others = [kind for kind in of_kind if not kind.is_pose]
+        if Kind.PLACE in of_kind and len(others) < len(joints) and not fitting:
             raise InvalidDemonstrationsError(
                 f"episode {recording.episode} has no joint {missing}; it has {there}, a place and "
                 "no joints: name what holds the joints with --key, or import the place into a "
@@ -284,23 +245,3 @@ def _left_out(recordings: Sequence[Recording], columns: Sequence[list[int]]) -> 
         for name, spans in ranges.items()
     ]
     return listed(said, "; ")
-
-
-def _said_unit(
-    recordings: Sequence[Recording], columns: list[list[int]], index: int, given: str | None
-) -> str | None:
-    """Unit of a channel as given, else as the first file that states one does; None if none does.
-
-    ConfigurationError if a file states another than the one that is given.
-    """
-    given = given if given is None else known_unit(given) or given
-    first = None
-    for recording, column in zip(recordings, columns, strict=True):
-        own = recording.units[column[index]]
-        if own is not None and given not in (None, own):
-            raise ConfigurationError(
-                f"{recording.names[column[index]]} of episode {recording.episode} is in {own}, but "
-                f"--units says {given}; correct or drop it"
-            )
-        first = first or own
-    return given or first

@@ -88,7 +88,7 @@ def with_whole_dates(table: Table) -> Table:
     """Return a table whose columns of dates and of times of day are one: `09.03.2024 23:58:00`."""
     found = {name.lower(): i for i, name in enumerate(table.names) if table.named}
     date, time = (next((found[n] for n in own if n in found), None) for own in (_DATES, _TIMES))
-    if date is None or time is None or not (table.is_text(date) and table.is_text(time)):
+    if date is None or time in (None, date) or not (table.is_text(date) and table.is_text(time)):
         return table
     both = [" ".join(each) for each in zip(table.cells[date], table.cells[time], strict=True)]
     cells = [both if i == time else own for i, own in enumerate(table.cells) if i != date]

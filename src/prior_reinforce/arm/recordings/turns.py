@@ -11,12 +11,15 @@ import re
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.selection import Selection
-from prior_reinforce.arm.recordings.units import is_no_angle, listed
+from prior_reinforce.arm.recordings.units import listed
 from prior_reinforce.arm.robots.limits import RobotLimits, is_joint, with_turns
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.motions import Demonstrations
@@ -40,17 +43,19 @@ _NORM = 0.05
 """By which the four numbers of a quaternion may miss length 1."""
 _SAME = 1e-3
 """The same where only that tells that they are one. Ours: recorders write four digits or more."""
+_OF_VECTORS = {"rad", "1"}
+"""Units that the numbers of an attitude without names may be in."""
+_STILL = 0.03
+"""By less, no number of a quaternion moves. Ours."""
 _NOISE = 0.02
 """The same of a channel that may be no angle: a magnet's current that is switched off steps by
 about a turn too. Ours: an encoder's noise."""
-_ANGLE = re.compile(
-    r"joint|axis|achse|gelenk|winkel|angle|rot|turn|twist|swing|steer|roll|pitch|yaw|heading|azimut"
-    r"|bearing|theta|phi|psi|alpha|beta|gamma|base|basis|waist|torso|shoulder|schulter|elbow"
-    r"|ellbogen|arm|wrist|hand|hip|knee|ankle|neck|head|pan|tilt",
-    re.IGNORECASE,
-)
-"""Names of angles. What has no unit is in radians all the same: a magnet's current."""
 _MOST_TURNS = 3
+"""By which an episode is shifted at most. Ours."""
+_Form = Callable[[np.ndarray], np.ndarray]
+"""From attitudes (..., 3) or (..., 4) to other numbers of the same."""
+_Apart = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""How far two attitudes are apart, as they are written."""
 
 
 def aligned(
@@ -72,35 +77,49 @@ def aligned(
     recorded = zip(selection.names, selection.recorded_units, strict=True)
     degrees = {name for name, unit in recorded if unit == "deg"}
     # `rx`, `ry`, `rz` are a rotation vector where they are in radians, and else Euler angles.
-    euler = [g for g in euler_angles(form.names, form.units) if degrees.issuperset(g)]
-    told = [g for g in form.attitudes if {*g} in map(set, euler)]
-    form = replace(form, attitudes=tuple(g for g in form.attitudes if g not in told))
-    form = replace(form, attitudes=tuple(_unit_length(form, motions)))
+    euler = [{*g} for g in euler_angles(form.names, form.units) if degrees.issuperset(g)]
+    told = [g for g in form.attitudes if {*g} in euler]
+    kept = []
+    for group in form.attitudes:
+        own = [motion[:, [form.names.index(name) for name in group]] for motion in motions]
+        if group not in told and (len(group) == 3 or _off_length_1(own) < _NORM):
+            kept.append(group)
+    form = replace(form, attitudes=tuple(kept))
     if before is not None:
         form = replace(before.format, dt=1.0)
     form, said = _align(form, episodes, motions, limits, angles=degrees, fixed=len(shown))
-    if any(np.any(motion != plan) for motion, plan in zip(motions, shown, strict=False)):
-        raise InvalidDemonstrationsError(
-            f"with the new demonstrations, those so far are other turns or signs of the same poses "
-            f"({'; '.join(said)}); import all together"
-        )
     new = motions[len(shown) :]
-    for i, (name, unit) in enumerate(zip(form.names, form.units, strict=True)):
-        starts = [[motion[0, i] for motion in each] for each in (new, shown)]
-        apart = np.median(starts[0]) - np.median(starts[1]) if len(shown) else 0.0
-        if unit in TURN and abs(apart) > 0.9 * TURN[unit]:
-            raise InvalidDemonstrationsError(
-                f"{name} of the new demonstrations starts {apart:.3g} {unit} from where it did so "
-                "far, about a turn; import all together"
-            )
-    periodic = dict.fromkeys((*form.periodic, *(name for group in told for name in group)))
-    form = replace(form, periodic=tuple(periodic))
+    if before is not None:
+        _check_in_use(before, motions[: len(shown)], new, said)
+    form = replace(form, periodic=tuple(dict.fromkeys((*form.periodic, *chain(*told)))))
     recordings = tuple(
         replace(recording, positions=motion)
         for recording, motion in zip(selection.recordings, new, strict=True)
     )
     remarks = (*selection.remarks, *said)
     return replace(selection, recordings=recordings, remarks=remarks), form
+
+
+def _check_in_use(
+    before: Demonstrations,
+    theirs: Sequence[np.ndarray],
+    new: Sequence[np.ndarray],
+    said: Sequence[str],
+) -> None:
+    """Refuse new motions beside which those in use would be others, or that start a turn away."""
+    if any(np.any(motion != plan) for motion, plan in zip(theirs, before.plans, strict=True)):
+        raise InvalidDemonstrationsError(
+            f"with the new demonstrations, those so far are other turns or signs of the same poses "
+            f"({'; '.join(said)}); import all together"
+        )
+    form = before.format
+    apart = np.median([m[0] for m in new], axis=0) - np.median(before.plans[:, 0], axis=0)
+    for name, unit, by in zip(form.names, form.units, apart.tolist(), strict=True):
+        if unit in TURN and abs(by) > 0.9 * TURN[unit]:
+            raise InvalidDemonstrationsError(
+                f"{name} of the new demonstrations starts {by:.3g} {unit} from where it did so "
+                "far, about a turn; import all together"
+            )
 
 
 def _align(
@@ -125,70 +144,66 @@ def _align(
     Raises:
         InvalidDemonstrationsError: As in `aligned`.
     """
-    named = form.attitudes
-    form = replace(form, attitudes=(*named, *_unnamed_attitudes(form, named, motions)))
-    said: list[str] = []
-    taken = {name for group in form.attitudes for name in group}
-    for group in form.attitudes:
-        said += _align_forms(form, episodes, motions, group)
+    for size, are in ((4, _are_quaternions), (3, _start_at_two_forms)):
+        taken = {*form.periodic, *chain(*form.attitudes)}
+        unnamed = _consecutive(form, motions, size, taken, are)
+        form = replace(form, attitudes=(*form.attitudes, *unnamed))
+    attitudes = {*chain(*form.attitudes)}
     joints = {name for name in form.names if np.isfinite(_range(name, limits)[0])}
-    euler = [g for g in euler_angles(form.names, form.units) if (taken | joints).isdisjoint(g)]
-    own = {name for group in euler for name in group}
-    for each in (*euler, *_flipping(form, motions, taken | own | joints)):
-        said += _align_forms(
-            form, episodes, motions, each, TURN[form.units[form.names.index(each[0])]]
-        )
-    for i, (name, unit) in enumerate(zip(form.names, form.units, strict=True)):
-        if unit in TURN and name not in taken and not is_no_angle(name):
-            known = name in own or name in angles or _is_angle(name, limits)
-            said += _align_angle(form, episodes, motions, i, limits, known=known, fixed=fixed)
+    named = [g for g in euler_angles(form.names, form.units) if (attitudes | joints).isdisjoint(g)]
+    euler = {*chain(*named)}
+    tools = {n for n, kind in zip(form.names, kinds(form.names), strict=True) if kind is Kind.TOOL}
+    flipping = _consecutive(form, motions, 3, attitudes | joints | euler | tools, _flip)
+    together = _Together(form, episodes, motions)
+    said = [what for group in form.attitudes for what in together.take_forms(group)]
+    for group in (*named, *flipping):
+        said += together.take_forms(group, TURN[form.units[form.names.index(group[0])]])
+    of_kind = zip(form.names, form.units, kinds(form.names), strict=True)
+    for i, (name, unit, kind) in enumerate(of_kind):
+        if unit in TURN and name not in attitudes and kind is not Kind.TOOL:
+            known = name in {*angles, *euler, *joints} or kind is Kind.ANGLE or not _is_word(name)
+            said += together.take_turns(i, _range(name, limits), known=known, fixed=fixed)
     return form, said
 
 
-def _is_angle(name: str, limits: RobotLimits | None) -> bool:
-    """Whether a channel in radians is an angle by its name, and not only for want of a unit."""
+def _is_word(name: str) -> bool:
+    """Whether a name is a plain word, which without a unit may be anything: a magnet's current."""
     words = re.findall(r"[^\W\d_]+", name)
-    plain = len(words) > 0 and re.search(r"\d", name) is None and max(map(len, words)) > 1
-    return not plain or _ANGLE.search(name) is not None or np.isfinite(_range(name, limits)[0])
+    return max(map(len, words), default=0) > 1 and re.search(r"\d", name) is None
 
 
-def _unit_length(form: PlanFormat, motions: Sequence[np.ndarray]) -> Iterator[tuple[str, ...]]:
-    """Attitudes, without those called like a quaternion whose numbers have not length 1."""
-    for group in form.attitudes:
-        columns = [form.names.index(name) for name in group]
-        lengths = np.concatenate([np.linalg.norm(m[:, columns], axis=1) for m in motions])
-        if len(group) == 3 or np.all(np.abs(lengths - 1) < _NORM):
-            yield group
+def _consecutive(
+    form: PlanFormat,
+    motions: Sequence[np.ndarray],
+    size: int,
+    taken: set[str],
+    are: Callable[[Sequence[np.ndarray], set[str]], bool],
+) -> list[tuple[str, ...]]:
+    """Channels side by side whose numbers, and units, say that they are one attitude.
 
-
-def _unnamed_attitudes(
-    form: PlanFormat, named: Sequence[tuple[str, ...]], motions: Sequence[np.ndarray]
-) -> Iterator[tuple[str, ...]]:
-    """Attitudes whose names do not say so, such as `pose_3` to `pose_6`: their numbers do.
-
-    Four numbers whose length is 1 throughout are a quaternion. Three are a rotation vector where
-    some episodes start at one, and others at the same attitude's other form.
+    For instance `pose_3` to `pose_6`. None is of two, or of those already taken.
     """
-    taken = {name for group in named for name in group} | set(form.periodic)
-    for size in (4, 3):
-        for first in range(len(form.names) - size + 1):
-            group, columns = form.names[first : first + size], slice(first, first + size)
-            if not taken.isdisjoint(group) or {*form.units[columns]} - {"rad", "1"}:
-                continue
-            own = [motion[:, columns] for motion in motions]
-            if _are_unit_length(own) if size == 4 else _start_at_two_forms(own):
-                taken |= set(group)
-                yield group
+    found, taken = [], {*taken}
+    for first in range(len(form.names) - size + 1):
+        columns = slice(first, first + size)
+        group, own = form.names[columns], [motion[:, columns] for motion in motions]
+        if taken.isdisjoint(group) and are(own, {*form.units[columns]}):
+            taken |= {*group}
+            found.append(group)
+    return found
 
 
-def _are_unit_length(motions: Sequence[np.ndarray]) -> bool:
-    """Whether four numbers that move have length 1 throughout, as quaternions do."""
-    every = np.concatenate(motions)
-    far = np.abs(np.linalg.norm(every, axis=1) - 1).max()
-    return bool(np.ptp(every, axis=0).max() > _NEXT / 10 and far < _SAME)
+def _off_length_1(motions: Sequence[np.ndarray]) -> float:
+    return max(float(np.abs(np.linalg.norm(motion, axis=1) - 1).max()) for motion in motions)
 
 
-def _start_at_two_forms(motions: Sequence[np.ndarray]) -> bool:
+def _are_quaternions(motions: Sequence[np.ndarray], units: set[str]) -> bool:
+    """Whether four numbers that move have length 1 throughout."""
+    moves = np.ptp(np.concatenate(motions), axis=0).max() > _STILL
+    return bool(units <= _OF_VECTORS and moves and _off_length_1(motions) < _SAME)
+
+
+def _start_at_two_forms(motions: Sequence[np.ndarray], units: set[str]) -> bool:
     """Whether some motions start at one rotation vector, and the others at its other form.
 
     Angles of their own, which lie apart though they are turned, are none.
@@ -198,168 +213,144 @@ def _start_at_two_forms(motions: Sequence[np.ndarray]) -> bool:
     turned = off - TURN["rad"] * np.round(off / TURN["rad"])
     near, far, turned = (np.linalg.norm(each, axis=1) for each in (off, other, turned))
     some = np.any((near > 1) & (far < np.minimum(_NEXT, turned / 2)))
-    return bool(some and np.all(np.minimum(near, far) < 1))
+    return bool(units <= _OF_VECTORS and some and np.all(np.minimum(near, far) < 1))
 
 
-def _flipping(
-    form: PlanFormat, motions: Sequence[np.ndarray], taken: set[str]
-) -> Iterator[tuple[str, ...]]:
-    """Three angles whose first and last step by half a turn in the same frame, as no joints do."""
-    for first in range(len(form.names) - 2):
-        group, columns = form.names[first : first + 3], slice(first, first + 3)
-        turn = TURN.get(form.units[first])
-        if turn is None or {*form.units[columns]} != {form.units[first]}:
-            continue
-        if not taken.isdisjoint(group) or any(map(is_no_angle, group)):
-            continue
-        steps = [np.abs(np.diff(motion[:, columns], axis=0)) % turn for motion in motions]
-        half = [np.abs(s[:, [0, 2]] - turn / 2).max(axis=1) < HALF * turn for s in steps]
-        if any(map(np.any, half)):
-            taken = taken | {*group}
-            yield group
+def _flip(motions: Sequence[np.ndarray], units: set[str]) -> bool:
+    """Whether the first and last of three angles step by half a turn at once, as no joints do."""
+    turn = TURN.get(next(iter(units)))
+    if turn is None or len(units) > 1:
+        return False
+    steps = [np.abs(np.diff(motion[:, [0, 2]], axis=0)) % turn for motion in motions]
+    return any(bool(np.any(np.abs(s - turn / 2).max(axis=1) < HALF * turn)) for s in steps)
 
 
-@dataclass(frozen=True, eq=False)
-class _InForms:
-    """Motions in those forms of an attitude that continue each other."""
+class _InForms(NamedTuple):
+    """A motion in those forms of an attitude that continue each other, from the first one's on."""
 
-    frames: list[np.ndarray]
-    passed: list[int]
-    """Motions that change their form."""
-    turned: list[int]
-    """Motions that start in another form than the first."""
-    near: Channel
-    far: Channel
-    """How far each starts from the first, as it is and in the other form."""
+    frames: np.ndarray
+    changes: bool
+    """Whether it was in several forms."""
+    turned: bool
+    """Whether it starts in another form than the first motion."""
+    near: float
+    far: float
+    """How far it starts from the first motion, as it is and in the other form."""
     leaps: float
-    """What is left of steps from frame to frame, and from start to start: their sum."""
+    """What is left of its steps from frame to frame, and from the first motion's start: a sum."""
 
 
 def _in_forms(
-    motions: Sequence[np.ndarray],
-    other: Callable[[np.ndarray], np.ndarray],
-    apart: Callable[[np.ndarray, np.ndarray], np.ndarray],
-    margin: float,
+    own: np.ndarray, start: np.ndarray, other: _Form, apart: _Apart, margin: float
 ) -> _InForms:
-    """Take the form that is nearest to the frame, and to the motion, before."""
-    frames, passed, turned, leaps = [], list[int](), list[int](), 0.0
-    starts = []
-    for i, own in enumerate(motions):
-        forms = np.stack([own, other(own)])
-        which = np.zeros(len(own), dtype=int)
-        steps = apart(forms[:, None, 1:], forms[:, :-1])  # of each form now from each before
-        for t in np.flatnonzero(
-            steps.min(axis=(0, 1)) < np.maximum(steps[0, 0], steps[1, 1]) - margin
-        ).tolist():
-            k = which[t]
-            if steps[1 - k, k, t] < steps[k, k, t] - margin:
-                which[t + 1 :] = 1 - k
-        if np.any(which):
-            passed.append(i)
-        near, far = apart(forms[:, 0], motions[0][0])
-        if far < near - margin:
-            which = 1 - which
-            turned.append(i)
-        starts.append((near, far))
-        frames.append(forms[which, np.arange(len(own))])
-        leaps += float(apart(frames[-1][1:], frames[-1][:-1]).sum() + min(near, far))
-    near, far = np.array(starts).T
-    return _InForms(frames, passed, turned, near, far, leaps)
+    """Take the form that is nearer than the other, by a margin, to the frame before."""
+    forms = np.stack([own, other(own)])
+    which = np.zeros(len(own), dtype=int)
+    steps = apart(forms[:, None, 1:], forms[:, :-1])  # of each form now from each before
+    switches = steps.min(axis=(0, 1)) < np.maximum(steps[0, 0], steps[1, 1]) - margin
+    for t in np.flatnonzero(switches).tolist():
+        k = which[t]
+        if steps[1 - k, k, t] < steps[k, k, t] - margin:
+            which[t + 1 :] = 1 - k
+    near, far = apart(forms[:, 0], start)
+    turned = bool(far < near - margin)
+    frames = forms[1 - which if turned else which, np.arange(len(own))]
+    leaps = float(apart(frames[1:], frames[:-1]).sum() + min(near, far))
+    return _InForms(frames, bool(np.any(which)), turned, near, far, leaps)
 
 
-def _align_forms(
-    form: PlanFormat,
-    episodes: Sequence[str],
-    motions: Sequence[np.ndarray],
-    group: Sequence[str],
-    turn: float = 0.0,
-) -> Iterator[str]:
-    """Take the form of an attitude that is nearest to the frame, and to the episode, before.
+@dataclass(frozen=True, eq=False)
+class _Together:
+    """Motions that are brought together in place; each method says what it does to them."""
 
-    `turn` is a whole turn of Euler angles; 0 is of quaternions and rotation vectors.
-    """
-    columns, what = [form.names.index(name) for name in group], ", ".join(group)
-    others: Sequence[Callable[[np.ndarray], np.ndarray]] = [other_form]
-    if turn:
-        others = [partial(other, turn) for other in other_euler_forms(group)]
-    margin = _NEXT * (turn or TURN["rad"]) / TURN["rad"]
+    form: PlanFormat
+    episodes: Sequence[str]
+    motions: Sequence[np.ndarray]
 
-    def apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-        step = one - other
-        return np.linalg.norm(step - turn * np.round(step / turn) if turn else step, axis=-1)
+    def take_forms(self, group: Sequence[str], turn: float = 0.0) -> Iterator[str]:
+        """Take the form of an attitude that is nearest to the frame, and to the episode, before.
 
-    own = [motion[:, columns] for motion in motions]
-    best = min((_in_forms(own, o, apart, margin) for o in others), key=lambda each: each.leaps)
-    for i, episode in enumerate(episodes):
-        near, far = best.near[i], best.far[i]
-        halfway = not turn and abs(far - near) < _NEXT and max(far, near) > 1
-        if halfway or (len(others) > 1 and i in best.turned and far > turn / TURN["rad"]):
+        `turn` is a whole turn of Euler angles; 0 is of quaternions and rotation vectors.
+        """
+        columns, what = [self.form.names.index(name) for name in group], ", ".join(group)
+        others: Sequence[_Form] = [other_form]
+        if turn:
+            others = [partial(other, turn) for other in other_euler_forms(group)]
+        margin = _NEXT * (turn or TURN["rad"]) / TURN["rad"]
+
+        def apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+            step = one - other
+            return np.linalg.norm(step - turn * np.round(step / turn) if turn else step, axis=-1)
+
+        own = [motion[:, columns] for motion in self.motions]
+        tried = [[_in_forms(o, own[0][0], other, apart, margin) for o in own] for other in others]
+        best = min(tried, key=lambda each: sum(one.leaps for one in each))
+        for episode, motion, one in zip(self.episodes, self.motions, best, strict=True):
+            middle = abs(one.far - one.near) < _NEXT and max(one.far, one.near) > 1
+            either = len(others) > 1 and one.turned and one.far > turn / TURN["rad"]
+            if either or (middle and not turn):
+                raise InvalidDemonstrationsError(
+                    f"episode {episode} starts half a turn from {self.episodes[0]} in {what}: "
+                    "which way lies between them cannot be told; leave one out (--leave-out)"
+                )
+            motion[:, columns] = one.frames
+        changed = "change their sign within the motion, which is one attitude"
+        sign = "sign" if len(group) == 4 else "numbers of the same turn"
+        taken = f"have the other {sign}, and are taken as the same attitude"
+        if turn:
+            changed = "change to the other angles of the same attitude within the motion, and are "
+            changed += "continued"
+            taken = "are taken as the same attitude's other angles"
+        changing = [e for e, one in zip(self.episodes, best, strict=True) if one.changes]
+        turned = [e for e, one in zip(self.episodes, best, strict=True) if one.turned]
+        for those, says in ((changing, changed), (turned, taken)):
+            if those:
+                yield f"{listed(those)}: {what} {says}"
+
+    def take_turns(
+        self, channel: int, limits: tuple[float, float], *, known: bool, fixed: int
+    ) -> Iterator[str]:
+        """Continue an angle across the end of its range, and start all episodes in one turn.
+
+        What is not `known` to be an angle is one where it passes the end of a range smoothly. It
+        keeps to its `limits`, and the `fixed` first motions stay.
+        """
+        name, unit = self.form.names[channel], self.form.units[channel]
+        turn, own = TURN[unit], [motion[:, channel] for motion in self.motions]
+        left = (_NEXT if known else _NOISE) * turn / TURN["rad"]
+        passed = list[str]()
+        for episode, values in zip(self.episodes, own, strict=True):
+            unwrapped = _continued(values, turn, left)
+            if np.any(unwrapped != values):
+                passed.append(episode)
+            values[:] = unwrapped
+            step = np.abs(np.diff(values))
+            stopped = np.isfinite(limits[0]) or name in self.form.periodic
+            if stopped and step.max() > turn / 2:
+                raise InvalidDemonstrationsError(
+                    f"episode {episode}: {name} steps by {step.max():.3g} {unit} at frame "
+                    f"{int(np.argmax(step)) + 1}, which no joint does in one frame; mend that "
+                    "frame, or drop that episode (--leave-out)"
+                )
+        if passed:
+            yield f"{listed(passed)}: {name} passes the end of its range, and is continued"
+        elif not known:
+            return
+        spans = np.array([[values[0], values.min(), values.max()] for values in own])
+        shifts = _shifts(spans, turn, *limits, fixed)
+        if shifts is None:
             raise InvalidDemonstrationsError(
-                f"episode {episode} starts half a turn from {episodes[0]} in {what}: "
-                "which way lies between them cannot be told; leave one out (--leave-out)"
+                f"{name} starts all round the circle, from {spans[:, 0].min():.3g} to "
+                f"{spans[:, 0].max():.3g} {unit}: which of two turns an episode is "
+                "in cannot be told; import those apart that start elsewhere (--leave-out)"
             )
-    for motion, frames in zip(motions, best.frames, strict=True):
-        motion[:, columns] = frames
-    sign = "sign" if len(group) == 4 else "numbers of the same turn"
-    changed = "change their sign within the motion, which is one attitude"
-    taken = f"have the other {sign}, and are taken as the same attitude"
-    if turn:
-        changed = "change to the other angles of the same attitude within the motion, and are "
-        changed += "continued"
-        taken = "are taken as the same attitude's other angles"
-    for those, says in ((best.passed, changed), (best.turned, taken)):
-        if those:
-            yield f"{listed([episodes[i] for i in those])}: {what} {says}"
-
-
-def _align_angle(
-    form: PlanFormat,
-    episodes: Sequence[str],
-    motions: Sequence[np.ndarray],
-    channel: int,
-    limits: RobotLimits | None,
-    *,
-    known: bool,
-    fixed: int,
-) -> Iterator[str]:
-    """Continue an angle across the end of its range, and start all episodes in one turn.
-
-    What is not `known` to be an angle is one where it passes the end of a range smoothly.
-    """
-    name, unit = form.names[channel], form.units[channel]
-    turn, (low, high) = TURN[unit], _range(name, limits)
-    left = (_NEXT if known else _NOISE) * turn / TURN["rad"]
-    passed = list[str]()
-    for episode, motion in zip(episodes, motions, strict=True):
-        unwrapped = _continued(motion[:, channel], turn, left)
-        if np.any(unwrapped != motion[:, channel]):
-            passed.append(episode)
-        motion[:, channel] = unwrapped
-        step = np.abs(np.diff(unwrapped))
-        if (np.isfinite(low) or name in form.periodic) and step.max() > turn / 2:
-            raise InvalidDemonstrationsError(
-                f"episode {episode}: {name} steps by {step.max():.3g} {unit} "
-                f"at frame {int(np.argmax(step)) + 1}, which no joint does in one frame; mend that "
-                "frame, or drop that episode (--leave-out)"
-            )
-    if passed:
-        yield f"{listed(passed)}: {name} passes the end of its range, and is continued"
-    elif not known:
-        return
-    spans = np.array([[m[0, channel], m[:, channel].min(), m[:, channel].max()] for m in motions])
-    shifts = _shifts(spans, turn, low, high, fixed)
-    if shifts is None:
-        raise InvalidDemonstrationsError(
-            f"{name} starts all round the circle, from {spans[:, 0].min():.3g} to "
-            f"{spans[:, 0].max():.3g} {unit}: which of two turns an episode is "
-            "in cannot be told; import those apart that start elsewhere (--leave-out)"
-        )
-    for shift in sorted(set(shifts.tolist()) - {0}):
-        moved = [e for e, k in zip(episodes, shifts, strict=True) if k == shift]
-        turns = f"{abs(shift)} turn{'s' * (abs(shift) > 1)} {'higher' if shift > 0 else 'lower'}"
-        yield f"{listed(moved)}: {name} is taken {turns}, as the others have it: the same pose"
-    for motion, shift in zip(motions, shifts, strict=True):
-        motion[:, channel] += shift * turn
+        for shift in sorted({*shifts.tolist()} - {0}):
+            moved = [e for e, k in zip(self.episodes, shifts, strict=True) if k == shift]
+            turns = f"{abs(shift)} turn{'s' * (abs(shift) > 1)}"
+            turns += " higher" if shift > 0 else " lower"
+            yield f"{listed(moved)}: {name} is taken {turns}, as the others have it: the same pose"
+        for values, shift in zip(own, shifts, strict=True):
+            values += shift * turn
 
 
 def _range(name: str, limits: RobotLimits | None) -> tuple[float, float]:

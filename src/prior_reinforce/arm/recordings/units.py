@@ -6,14 +6,12 @@ that settles it.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from prior_reinforce.errors import ConfigurationError, UnclearUnitsError
-from prior_reinforce.plans.whole_turns import TURN, attitudes
-from prior_reinforce.units import STATED, UNITS, base_of, factor, spelt, units_of
+from prior_reinforce.units import STATED, UNITS, factor, spelt, units_of
 
 SECONDS = units_of("time")
 """Units of time, in [s]."""
@@ -34,39 +32,6 @@ _PLAUSIBLE: Mapping[str, Mapping[str, tuple[float, float]]] = {
 greatest number: of angles and lengths the largest one, of periods the time between two frames.
 Ours: no joint turns two turns; above 300, millimetres are likelier than an arm of three metres; no
 gripper opens by 30 cm; one that moves by less than a percent is recorded as a share."""
-_NO_ANGLE = re.compile(
-    r"grip|jaw|finger|width|claw|opening|suction|robotiq|wsg|greifer|pince|夹爪|夹具|vacuum|valve"
-    r"|pressure|force|torque|voltage|temperature",
-    re.I,
-)
-_APART: Mapping[str, Sequence[float]] = {"rad": (180 / math.pi,), "m": (100.0, 1000.0)}
-"""How many times larger numbers get by the next unit: rad to deg, m to cm and mm."""
-_ALIKE, _FAR_APART = 1.5, 20.0
-"""How much takes of one task may differ, and times apart from which two plausible units are two.
-Ours."""
-_MATRIX = re.compile(r"(?P<stem>.*?)[_\[ ]*(?P<row>[0-4])[,_]?(?P<column>[0-4])\]?")
-_TURNS = (
-    r"yaw|roll|pitch|rotation|angle|winkel|mcp|pip|dip|cmc|flex(ion)?|abd(uction)?|azimuth|heading"
-)
-_ANGLE_ALWAYS = re.compile(rf"(^|[^a-z])({_TURNS})s?($|[^a-z])", re.I)
-"""Names of angles, whatever else stands beside: `gripper_yaw`, `index_finger_mcp`."""
-_ANGLE = re.compile(
-    rf"(^|[^a-z])({_TURNS}|joint|gelenk|j|q|a|pan|tilt|turn|rot(ation)?|wrist|elbow|shoulder|waist"
-    r"|hip|knee|ankle|neck|theta|phi|psi)s?($|[^a-z])", re.I
-)  # fmt: skip
-_LENGTH = re.compile(
-    r"(^|[^a-z])(e\d|ext(ernal)?([_ ]?axis)?[_ ]?\d*|rail|track|linear|slider?|gantry|prismatic"
-    r"|carriage)($|[^a-z])",
-    re.I,
-)
-"""Names of axes that may be lengths: a KUKA's `E1`."""
-_PLACE = re.compile(r"(?P<stem>|.*[^a-z0-9])(?P<axis>[xyz])", re.IGNORECASE)
-_OF_PLACE = re.compile(
-    r"(.*[^a-z])?(p|pos|positions?|place|trans(lation)?|cart(esian)?|tcp|tool|tip|ee|eef|pose|xyz"
-    r"|(end_?)?effector|flange|hand|location)[^a-z]*",
-    re.IGNORECASE,
-)
-"""What x, y and z are the place of: `tool_x`. Others may be joints: `hip_x`, `hip_y`."""
 _BRACKETS = re.compile(r"(?P<name>.+?)\s*[\[(]\s*(?P<unit>[^\[\]()]+?)\s*[\])]")
 _ENDING = re.compile(r"(?P<name>.+?)[_ ](?P<unit>[a-zµμ°]+)")
 _CAMEL = re.compile(r"(?P<name>.*[a-z0-9])(?P<unit>[A-Z][a-z]+|DEG|RAD|MM|CM|MS|US|NS)")
@@ -113,62 +78,6 @@ def known_unit(text: str) -> str | None:
     """Return the unit that a text spells, for instance `deg` for `°`; None if it spells none."""
     unit = spelt(text.strip().strip("[]().").strip())
     return unit if unit in _UNITS else None
-
-
-def is_no_angle(name: str) -> bool:
-    """Whether a channel's name says that it is no angle unless its unit is said: a gripper's."""
-    return _NO_ANGLE.search(name) is not None and not _ANGLE_ALWAYS.search(_spaced(name))
-
-
-def says_angle(name: str) -> bool:
-    """Whether a channel's name says that it is an angle: `base_yaw`, `joint3`, `A1`."""
-    return _ANGLE.search(_spaced(name)) is not None and not is_no_angle(name)
-
-
-def may_be_length(name: str) -> bool:
-    """Whether a channel's name leaves open if it turns or slides: a rail, an external axis."""
-    return _LENGTH.search(name) is not None and not _ANGLE_ALWAYS.search(_spaced(name))
-
-
-def _spaced(name: str) -> str:
-    """`baseYaw` as `base_Yaw`."""
-    return re.sub("(?<=[a-z0-9])(?=[A-Z])", "_", name)
-
-
-def place_names(names: Sequence[str]) -> set[str]:
-    """Return the channels that are lengths by their names: x, y and z, or `tool_x` and `tool_y`."""
-    of_attitudes = {name for group in attitudes(names) for name in group}
-    groups: dict[str, dict[str, str]] = {}
-    for name in names:
-        match = _PLACE.fullmatch(name.strip())
-        stem = "" if match is None else match["stem"]
-        if (
-            match is not None
-            and name not in of_attitudes
-            and (not stem or _OF_PLACE.fullmatch(stem))
-        ):
-            groups.setdefault(match["stem"], {})[match["axis"].lower()] = name
-    return {name for group in groups.values() if len(group) > 1 for name in group.values()}
-
-
-def matrix_names(names: Sequence[str]) -> set[str]:
-    """Return the entries of rotation matrices: `R11` to `R33`, which have no unit."""
-    groups: dict[str, dict[str, str]] = {}
-    for name in names:
-        if (match := _MATRIX.fullmatch(name.strip())) is not None:
-            groups.setdefault(match["stem"], {})[match["row"] + match["column"]] = name
-    found: set[str] = set()
-    for group in groups.values():
-        rows, columns = ({place[k] for place in group} for k in (0, 1))
-        if min(len(rows), len(columns)) >= 3 and len(group) == len(rows) * len(columns):
-            found |= {*group.values()}
-    return found
-
-
-def one_for_all(unit: str, names: Sequence[str]) -> list[str | None]:
-    """Return one unit for each channel that can be in it; grippers and places are no angles."""
-    is_angle, lengths = base_of(unit)[0] in TURN, place_names(names)
-    return [None if is_angle and (is_no_angle(n) or n in lengths) else unit for n in names]
 
 
 def split_unit(column: str, among: Collection[str] | None = None) -> tuple[str, str | None]:
@@ -230,25 +139,6 @@ def judge_unit(
     ranges = _PLAUSIBLE.get(kind, {unit: (0.0, float("inf"))})
     fitting = [u for u, (low, high) in ranges.items() if low <= number <= high]
     return unit if unit in fitting else next(iter(fitting), None)
-
-
-def odd_takes(reach: Sequence[float], unit: str) -> list[int]:
-    """Return the takes whose numbers are apart from most others' by as much as two units are.
-
-    `reach` is the largest number of each take: of angles in `rad`, of lengths in `m`, else of what
-    is a share where it is at most 1.
-    """
-    middle = sorted(reach)[(len(reach) - 1) // 2]
-    odd = []
-    for k, number in enumerate(reach):
-        if min(number, middle) <= 0:
-            continue
-        apart = max(number / middle, middle / number)
-        looks, usual = (judge_unit(unit, n) if unit else str(n <= 1) for n in (number, middle))
-        between = any(f / _ALIKE <= apart <= f * _ALIKE for f in _APART.get(unit, ()))
-        if between or (looks != usual and apart >= _FAR_APART):
-            odd.append(k)
-    return odd
 
 
 def is_possible(unit: str, number: float) -> bool:

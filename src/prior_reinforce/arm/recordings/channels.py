@@ -1,0 +1,131 @@
+"""What a recorded channel is by its name: one table for all that read, judge and align channels.
+
+A name tells a kind, and the kind the units that its numbers may be in. Some kinds are told by the
+names beside: `x` is a place beside `y`, and an entry of a matrix has eight others. Which names are
+no position of a robot's joint at all, a rate for instance, `robots.limits.says_no_position` tells.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from enum import Enum
+
+from prior_reinforce.plans.whole_turns import CIRCLES, TURN, attitudes
+from prior_reinforce.units import base_of
+
+
+class Kind(Enum):
+    """What a channel is; in no unit that its kind cannot have, unless that is stated."""
+
+    ANGLE = "an angle: joint3, base_yaw, gripper_roll, index_finger_mcp"
+    SLIDE = "an axis that turns or slides: a rail, E1"
+    ROTATION = "a part of a rotation vector, or of angles called like one: rx, ry, rz"
+    QUATERNION = "a part of a quaternion: qx, qy, qz, qw"
+    MATRIX = "an entry of a matrix: R11 to R33"
+    PLACE = "a coordinate: x, y, z, tool_x"
+    TOOL = "a gripper, or a sensor: a width, a share, a pressure"
+    UNKNOWN = "a name that says nothing"
+
+    @property
+    def is_pose(self) -> bool:
+        """Whether it is a part of where something is, and no joint."""
+        return self in (Kind.ROTATION, Kind.QUATERNION, Kind.PLACE)
+
+    def usual_unit(self, largest: float) -> str:
+        """Return the unit of its numbers where nobody states one, by the largest of them."""
+        if self is Kind.PLACE:
+            return "m"
+        share = self is Kind.TOOL and largest <= 1
+        return "1" if share or self in (Kind.QUATERNION, Kind.MATRIX) else "rad"
+
+
+_TURN = rf"{CIRCLES}|pitch|rotation|angle|winkel"
+_ALWAYS = rf"{_TURN}|mcp|pip|dip|cmc|flex(ion)?|abd(uction)?"
+_ALONE = "j|q|a"
+_WITHIN = (
+    rf"{_TURN}|joint|axis|achse|gelenk|rot|turn|twist|swing|steer|theta|phi|psi|alpha|beta|gamma"
+    r"|base|basis|waist|torso|shoulder|schulter|elbow|ellbogen|arm|wrist|hand|hip|knee|ankle|neck"
+    r"|head|pan|tilt"
+)
+"""Words of angles: those that outweigh a gripper's, those that stand alone, and those that are told
+within longer words too (`Handgelenk`)."""
+_TOOL = (
+    r"grip|jaw|finger|width|claw|opening|suction|robotiq|wsg|greifer|pince|夹爪|夹具|vacuum|valve"
+    r"|pressure|force|torque|voltage|temperature"
+)
+_SLIDE = r"e\d|ext(ernal)?([_ ]?axis)?[_ ]?\d*|rail|track|linear|slider?|gantry|prismatic|carriage"
+
+
+def _word(words: str) -> str:
+    """A pattern of words that stand apart from other letters."""
+    return rf"(^|[^a-z])({words})s?($|[^a-z])"
+
+
+_BY_WORD = (
+    (re.compile(_word(_ALWAYS), re.IGNORECASE), Kind.ANGLE),
+    (re.compile(_TOOL, re.IGNORECASE), Kind.TOOL),
+    (re.compile(_word(_SLIDE), re.IGNORECASE), Kind.SLIDE),
+    (re.compile(rf"{_word(_ALONE)}|{_WITHIN}", re.IGNORECASE), Kind.ANGLE),
+)
+"""Kinds by a word in the name; the first counts."""
+_COORDINATE = re.compile(r"(?P<group>|.*[^a-z0-9])(?P<part>[xyz])", re.IGNORECASE)
+_OF_PLACE = re.compile(
+    r"|(.*[^a-z])?(p|pos|positions?|place|trans(lation)?|cart(esian)?|tcp|tool|tip|ee|eef|pose|xyz"
+    r"|(end_?)?effector|flange|hand|location)[^a-z]*",
+    re.IGNORECASE,
+)
+"""What x, y and z are the place of: `tool_x`. Others may be joints: `hip_x`, `hip_y`."""
+_ENTRY = re.compile(r"(?P<group>.*?)[_\[ ]*(?P<part>[0-4][,_]?[0-4])\]?")
+
+
+def kinds(names: Sequence[str]) -> tuple[Kind, ...]:
+    """Return what each of a recording's channels is."""
+    of_group = {name: Kind.PLACE for name in _grouped(names, _COORDINATE, _are_place)}
+    of_group |= {name: Kind.MATRIX for name in _grouped(names, _ENTRY, _are_matrix)}
+    for group in attitudes(names):
+        of_group |= dict.fromkeys(group, Kind.QUATERNION if len(group) == 4 else Kind.ROTATION)
+    return tuple(of_group.get(name) or _by_word(name) for name in names)
+
+
+def one_for_all(
+    unit: str, names: Sequence[str], plan_units: Sequence[str] | None = None
+) -> list[str | None]:
+    """Return one unit for each channel that can be in it, and None for the others.
+
+    No gripper and no place is in degrees. Where the plan has channels of that unit's kind, these.
+    """
+    base = base_of(unit)[0]
+    fits = [base_of(own)[0] == base for own in plan_units or (base,) * len(names)]
+    other = (Kind.TOOL, Kind.PLACE, Kind.QUATERNION, Kind.MATRIX) if base in TURN else ()
+    each = zip(kinds(names), fits, strict=True)
+    return [unit if kind not in other and (fit or not any(fits)) else None for kind, fit in each]
+
+
+def _by_word(name: str) -> Kind:
+    spaced = re.sub("(?<=[a-z0-9])(?=[A-Z])", "_", name)  # `baseYaw` as `base_Yaw`
+    return next((kind for pattern, kind in _BY_WORD if pattern.search(spaced)), Kind.UNKNOWN)
+
+
+def _grouped(
+    names: Sequence[str], pattern: re.Pattern[str], are: Callable[[str, set[str]], bool]
+) -> Iterator[str]:
+    """Names that a pattern splits into a group and a part of it, of the groups that `are` so."""
+    matches = {name: match for name in names if (match := pattern.fullmatch(name.strip()))}
+    groups: dict[str, set[str]] = {}
+    for match in matches.values():
+        groups.setdefault(match["group"], set()).add(match["part"].lower())
+    for name, match in matches.items():
+        if are(match["group"], groups[match["group"]]):
+            yield name
+
+
+def _are_place(group: str, parts: set[str]) -> bool:
+    """Two or three coordinates of a place."""
+    return len(parts) > 1 and _OF_PLACE.fullmatch(group) is not None
+
+
+def _are_matrix(_: str, parts: set[str]) -> bool:
+    """Three rows and columns or more, of which every entry is there."""
+    rows, columns = ({part[k] for part in parts} for k in (0, -1))
+    return min(len(rows), len(columns)) >= 3 and len(parts) == len(rows) * len(columns)

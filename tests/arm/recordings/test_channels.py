@@ -1,0 +1,51 @@
+"""Every channel is of one kind by its name and those beside it."""
+
+import pytest
+
+from prior_reinforce.arm.recordings.channels import Kind, kinds, one_for_all
+
+
+@pytest.mark.parametrize(
+    ("kind", "names"),
+    [
+        (
+            Kind.ANGLE,
+            "joint3 q[0] A1 baseYaw panda_joint4 Handgelenk axis_2 current_elbow upperarm",
+        ),
+        (Kind.ANGLE, "gripper_yaw Gripper/Roll index_finger_mcp linear_angle"),
+        (Kind.TOOL, "gripper finger_joint1 robotiq_pos pressure 夹爪 linear_gripper Greiferweite"),
+        (Kind.SLIDE, "E1 rail ext_axis_1 linearAxis slider prismatic_joint"),
+        (Kind.UNKNOWN, "foo magnet crank spring x z"),
+        (Kind.PLACE, "tool.x tool.y"),
+        (Kind.PLACE, "gripper_tip_x gripper_tip_y gripper_tip_z"),
+        (Kind.ROTATION, "rx ry rz"),
+        (Kind.QUATERNION, "qx qy qz qw"),
+        (Kind.MATRIX, "R11 R12 R13 R21 R22 R23 R31 R32 R33"),
+    ],
+)
+def test_a_name_says_what_a_channel_is(kind, names):
+    alone = kind in (Kind.ANGLE, Kind.TOOL, Kind.SLIDE, Kind.UNKNOWN)
+    for group in ([name] for name in names.split()) if alone else [names.split()]:
+        assert {*kinds(group)} == {kind}, group
+
+
+def test_places_and_joints_are_told_apart_by_what_x_and_y_are_of():
+    assert kinds(["x", "y", "z", "q1"]) == (Kind.PLACE,) * 3 + (Kind.ANGLE,)
+    for joints in (["hip_x", "hip_y", "hip_z"], ["tool_rot_x", "tool_rot_y"], ["rx", "ry", "rz"]):
+        assert Kind.PLACE not in kinds(joints)
+    assert Kind.MATRIX not in kinds(["q_00", "q_01", "q_10", "q_11"])
+
+
+def test_the_usual_unit_is_that_of_the_kind():
+    assert [kind.usual_unit(3.0) for kind in (Kind.ANGLE, Kind.PLACE, Kind.MATRIX)] == [
+        "rad", "m", "1",
+    ]  # fmt: skip
+    assert [Kind.TOOL.usual_unit(most) for most in (0.8, 80.0)] == ["1", "rad"]
+
+
+def test_one_unit_is_of_all_that_can_be_in_it():
+    names = ("j1", "gripper", "x", "y", "qx", "qy", "qz", "qw")
+    assert one_for_all("deg", names) == ["deg", *[None] * 7]
+    assert one_for_all("mm", names) == ["mm"] * 8
+    assert one_for_all("mm", ("j1", "lift"), ("rad", "m")) == [None, "mm"]
+    assert one_for_all("percent", ("j1", "lift"), ("rad", "m")) == ["percent"] * 2

@@ -1,0 +1,79 @@
+"""Takes in another unit than the others are named, and none is converted by what others state."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from prior_reinforce.arm.recordings.selection import select
+from prior_reinforce.arm.recordings.takes import doubts_of_times
+from prior_reinforce.arm.recordings.units import Ambiguity
+from prior_reinforce.errors import InvalidDemonstrationsError
+from tests.arm.recordings.recorded import takes
+
+ARM = ("shoulder", "elbow", "wrist")
+RAD = np.array([0.4, -1.6, 0.1])
+
+
+@pytest.mark.parametrize("robot", [None, ["rad"] * 3])
+def test_one_take_in_degrees_is_named_and_not_taken_for_all(robot):
+    some = takes(ARM, RAD, RAD * 1.1, RAD * 180 / np.pi, RAD * 0.9)
+    (asked,) = select(some, plan_units=robot).ambiguities
+    assert "elbow of t2 reaches 91.67, and of the others 1.76 at most" in asked.what
+    assert asked.option == "--leave-out t2"
+    assert "elbow of t2 reaches" in select(some, plan_units=robot, units=["deg"]).remarks[0]
+    assert not select([r for r in some if r.episode != "t2"], plan_units=robot).ambiguities
+
+
+def test_one_take_in_radians_among_degrees_is_named_beside_the_unit_of_the_rest():
+    some = takes(ARM, RAD, *[RAD * 180 / np.pi * k for k in (1, 1.1, 0.9)])
+    options = [one.option for one in select(some).ambiguities]
+    assert options == ["--leave-out t0", "--units deg"]
+
+
+def test_a_gripper_in_percent_in_one_take_only_is_named():
+    some = takes(("elbow", "gripper"), (1, 0.8), (1, 0.9), (1, 80))
+    (asked,) = select(some).ambiguities
+    assert asked.option == "--leave-out t2"
+
+
+def test_takes_that_are_smaller_by_far_less_than_a_unit_are_no_question():
+    assert not select(takes(ARM, RAD, RAD / 5, RAD * 2)).ambiguities
+    options = [one.option for one in select(takes(ARM, RAD * 50, RAD * 4, RAD * 60)).ambiguities]
+    assert options == ["--units deg"]
+
+
+def test_each_file_is_converted_by_the_unit_that_it_states():
+    some = takes(("j1", "lift"), (1, 200), (1, 210), (1, 0.2),
+                 units=[(None, "mm"), (None, "mm"), (None, "m")])  # fmt: skip
+    found = select(some)
+    assert not found.ambiguities
+    assert [r.positions[-1, 1] for r in found.recordings] == pytest.approx([0.2, 0.21, 0.2])
+    assert found.remarks == (
+        "lift is in mm in t0 to t1, in m in t2, as they state: each is converted",
+    )
+    with pytest.raises(InvalidDemonstrationsError, match="lift is in mm in t0, but in deg in t1"):
+        select(takes(("j", "lift"), (1, 9), (1, 9), units=[(None, "mm"), (None, "deg")]))
+
+
+def test_a_file_that_states_no_unit_where_others_do_is_asked_about():
+    some = takes(("j1", "lift"), (1, 200), (1, 210), (1, 0.2),
+                 units=[(None, "mm"), (None, "mm"), (None, None)])  # fmt: skip
+    (asked,) = select(some).ambiguities
+    assert "lift is in mm in t0 to t1 (up to 210), and t2 states no unit (up to 0.2)" in asked.what
+    assert asked.option == "--leave-out t2"
+    assert "lift of t2 reaches 0.2" in select(some, units=["rad", "mm"]).remarks[0]
+
+
+def test_takes_whose_times_are_in_another_unit_are_named_if_they_are_the_fewer():
+    some = [replace_clock(take, i == 1) for i, take in enumerate(takes(ARM, RAD, RAD, RAD))]
+    (asked,) = doubts_of_times(some)
+    assert asked.what.startswith("t1: would take 1000 s, but t0, t2 would not be in that unit")
+    assert (asked.option, asked.guessed) == ("--leave-out t1", False)
+    assert doubts_of_times(some[1:2]) == list(some[1].ambiguities)
+
+
+def replace_clock(take, doubtful):
+    """The take, with times that may be in [ms]."""
+    doubts = (Ambiguity("would take 1000 s", "--time-unit ms"),) * doubtful
+    return replace(take, ambiguities=doubts)
