@@ -17,6 +17,7 @@ from prior_reinforce.arm.recordings.channels import Kind, kinds, one_for_all
         (Kind.SLIDE, "E1 rail ext_axis_1 linearAxis slider prismatic_joint"),
         (Kind.UNKNOWN, "foo magnet crank spring x z"),
         (Kind.PLACE, "tool.x tool.y"),
+        (Kind.PLACE, "X_axis Y_axis Z_axis"),
         (Kind.PLACE, "gripper_tip_x gripper_tip_y gripper_tip_z"),
         (Kind.ROTATION, "rx ry rz"),
         (Kind.QUATERNION, "qx qy qz qw"),

@@ -124,3 +124,16 @@ def test_numbers_are_found_and_what_cannot_be_parsed_is_none():
     )
     assert numbers == {"meta.a.fps": 50}
     assert "x" not in texts
+
+
+@pytest.mark.parametrize(
+    ("there", "found"),
+    [
+        (("gripper_width", "gripper_force", "joint1"), [2, 0]),
+        (("left_finger", "right_finger", "joint1"), None),
+        (("gripper", "gripper_width", "joint1"), [2, 0]),
+        (("gripper_effort", "joint1"), None),
+    ],
+)
+def test_the_only_opening_of_a_gripper_is_the_gripper(there, found):
+    assert find_channels(("joint1", "gripper"), there) == found

@@ -69,10 +69,10 @@ _BY_WORD = (
     (re.compile(rf"{_word(_ALONE)}|{_WITHIN}", re.IGNORECASE), Kind.ANGLE),
 )
 """Kinds by a word in the name; the first counts."""
-_COORDINATE = re.compile(r"(?P<group>|.*[^a-z0-9])(?P<part>[xyz])", re.IGNORECASE)
+_COORDINATE = re.compile(r"(?P<group>|.*[^a-z0-9])(?P<part>[xyz])([ _-]?ax[ei]s)?", re.IGNORECASE)
 _OF_PLACE = re.compile(
     r"|(.*[^a-z])?(p|pos|positions?|place|trans(lation)?|cart(esian)?|tcp|tool|tip|ee|eef|pose|xyz"
-    r"|(end_?)?effector|flange|hand|location)[^a-z]*",
+    r"|(end_?)?effector|flange|hand|location|ax[ei]s)[^a-z]*",
     re.IGNORECASE,
 )
 """What x, y and z are the place of: `tool_x`. Others may be joints: `hip_x`, `hip_y`."""

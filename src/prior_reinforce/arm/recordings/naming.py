@@ -20,6 +20,8 @@ _OF_POSITIONS = re.compile(
     r"(?<=.)([./\[]+(positions?|angle|value|q)\]?|_pos(ition)?)$", re.IGNORECASE
 )
 """What follows a joint's name where tools write the messages' fields: `/elbow/position`."""
+_OPENING = re.compile(r"grip|jaw|claw|finger", re.IGNORECASE)
+"""Names of a gripper's opening: the only one, `gripper_width`, is the plan's `gripper`."""
 Texts = Mapping[str, tuple[str, ...]]
 """Texts of a file, by what it calls them."""
 _DEEPEST = 12
@@ -151,4 +153,6 @@ def _find(name: str, there: Sequence[str]) -> int | None:
             f"{say_names([there[i] for i in found])} all look like {name}; name the recorded ones "
             "with --joints"
         )
-    return found[0] if found else None
+    if not found and _OPENING.search(bare):
+        found = [i for i, n in enumerate(names) if _OPENING.search(n) and not says_no_position(n)]
+    return found[0] if len(found) == 1 else None
