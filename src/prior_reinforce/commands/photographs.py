@@ -23,7 +23,7 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.extras import check_installed
 from prior_reinforce.files import named_disk_errors, refuse_foreign, write
-from prior_reinforce.units import looks_like
+from prior_reinforce.units import UNITS, looks_like
 from prior_reinforce.wording import to_words
 
 _COLUMNS = ("x", "y", "u", "v")
@@ -70,10 +70,10 @@ class Calibrate:
             if height is not None and looks_like("m", height):
                 raise ConfigurationError(f"--{name} must be metres above the table, got {height}")
         table_points, pixels = np.hsplit(_read_points(self.points), 2)
-        if looks_like("m", np.abs(table_points).max(initial=0.0)):
+        if looks := looks_like("m", np.abs(table_points).max(initial=0.0)):
             raise ConfigurationError(
-                f"a point {np.abs(table_points).max():g} m away looks like centimetres; x and y "
-                "must be metres"
+                f"a point {np.abs(table_points).max():g} m away looks like {UNITS[looks].plural}; "
+                f"write x [{looks}] and y [{looks}] in the head, or metres"
             )
         size = None
         if self.picture is not None:
