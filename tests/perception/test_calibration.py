@@ -118,8 +118,8 @@ def test_a_camera_below_the_plane_is_refused():
 def test_a_saved_calibration_comes_back(tmp_path):
     made = TableCalibration.fit(GRID, through_pinhole(at(GRID, 0.1)).round(), height=0.1)
     made = made.at_height(0.05, CAMERA)
-    made.save(tmp_path / "table.json")
-    loaded = TableCalibration.load(tmp_path / "table.json")
+    made.save(f"{tmp_path}/table.json")
+    loaded = TableCalibration.load(f"{tmp_path}/table.json")
     np.testing.assert_array_equal(loaded.homography, made.homography)
     assert loaded.summary() == made.summary()
     assert (loaded.height, loaded.fit_error) == (made.height, made.fit_error)

@@ -10,6 +10,7 @@ down, and the first pixel's centre is (0.5, 0.5).
 from __future__ import annotations
 
 import json
+import os
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -222,7 +223,7 @@ class TableCalibration:
             f"(each point through the others), plane {100 * self.height:.1f} cm above the table"
         )
 
-    def save(self, path: Path) -> None:
+    def save(self, path: str | os.PathLike[str]) -> None:
         """Write the calibration as JSON."""
         saved = {
             "kind": "prior-reinforce table calibration 2",
@@ -232,17 +233,17 @@ class TableCalibration:
             "fit_error_m": self.fit_error,
             "left_out_error_m": self.left_out_error,
         }
-        files.write(path, json.dumps(saved, indent=2) + "\n")
+        files.write(Path(path), json.dumps(saved, indent=2) + "\n")
 
     @classmethod
-    def load(cls, path: Path) -> TableCalibration:
+    def load(cls, path: str | os.PathLike[str]) -> TableCalibration:
         """Read what `save` wrote.
 
         Raises:
             FileFormatError: The file is missing or is not a calibration.
         """
         try:
-            saved = msgspec.json.decode(path.read_bytes(), type=_Saved)
+            saved = msgspec.json.decode(Path(path).read_bytes(), type=_Saved)
             np.linalg.inv(saved.homography)
         except (OSError, ValueError, np.linalg.LinAlgError) as error:
             raise FileFormatError(

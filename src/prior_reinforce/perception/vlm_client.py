@@ -88,7 +88,7 @@ class VisionLanguageModelConfig(Checked):
             )
 
     @classmethod
-    def load(cls, path: Path, *, needed: bool = True) -> Self:
+    def load(cls, path: str | os.PathLike[str], *, needed: bool = True) -> Self:
         """Read the section [vlm] of a TOML file: these settings by their names.
 
         Args:
@@ -100,7 +100,7 @@ class VisionLanguageModelConfig(Checked):
             ConfigurationError: An unknown setting, or a value of a wrong type or out of range.
         """
         try:
-            sections = tomllib.loads(path.read_text(encoding="utf-8"))
+            sections = tomllib.loads(Path(path).read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             raise FileFormatError(
                 f"cannot read {path} ({error}); expected a TOML file with a section [vlm]"
