@@ -347,7 +347,9 @@ def test_a_coarse_calibration_names_its_worst_point(tmp_path, run):
     assert "2 (0.6, 0.1)" in err
     thin = [(0.6, 0.4, 660.3, 765.2), (0.605, 0, 960.4, 760.1), (0.6, -0.4, 1259.6, 764.9)]
     thin += [(0.61, 0.2, 810.2, 757.7), (0.6, 0.1, 885, 765.4)]
-    assert "coarse" in run("calibrate", points_file(points, thin), "--out", tmp_path / "t.json")[2]
+    said = run("calibrate", points_file(points, thin), "--out", tmp_path / "t.json")[2]
+    assert "that is coarse beside the points" in said
+    assert "beside" not in err
 
 
 def drawn(path, size=(1920, 1080), ball=(1.05, 0.12), hoop=(1.0, 0.05)):

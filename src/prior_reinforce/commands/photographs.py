@@ -29,6 +29,9 @@ from prior_reinforce.wording import to_words
 _COLUMNS = ("x", "y", "u", "v")
 _COARSE = 0.02
 """Spread of a calibration that is warned of, in [m]; ours: more than any task's tolerance."""
+_BESIDE = 5.0
+"""From how many times the points' own errors on the points fix no places beside them; ours: it is
+1 to 3 where they stand in the corners of the table, with a wrong one or without."""
 _EXPOSURE = 10
 """Frames, of which the last is kept; ours: the first are dark until a webcam has set itself."""
 _SAME_GOAL, _OTHER_GOAL = 0.02, 0.15
@@ -95,11 +98,13 @@ class Calibrate:
                 for i, (x, y) in enumerate(table_points.tolist())
                 if agree[i]
             )
-            warn(
-                f"that is coarse; without point {says} the others agree: measure and click it again"
-                if 0 < agree.sum() <= len(agree) / 2
-                else "that is coarse; give more points, in all corners of the table"
-            )
+            if calibration.worst_sd > max(_COARSE, _BESIDE * calibration.fit_error):
+                remedy = " beside the points; give more, in all corners of the table"
+            elif 0 < agree.sum() <= len(agree) / 2:
+                remedy = f"; without point {says} the others agree: measure and click it again"
+            else:
+                remedy = "; give more points, in all corners of the table"
+            warn(f"that is coarse{remedy}")
 
 
 @dataclass(frozen=True)
