@@ -352,6 +352,21 @@ def test_a_coarse_calibration_names_its_worst_point(tmp_path, run):
     assert "beside" not in err
 
 
+def test_a_camera_that_was_measured_from_elsewhere_is_told(tmp_path, run):
+    """`POINTS` are seen from straight above (0.9, 0), at any height."""
+    points = points_file(tmp_path / "points.csv")
+    Image.new("RGB", (1920, 1080)).save(tmp_path / "table.png")
+    common = ("calibrate", points, "--picture", tmp_path / "table.png", "--outcome-height", "0.1")
+    common = (*common, "--out", tmp_path / "table.json", "--camera")
+    for camera in (("0.9", "0", "2.4"), ("0.85", "0.05", "2.3")):
+        assert run(*common, *camera)[::2] == (0, "")
+    for camera in (("0", "0", "1.2"), ("0.9", "0.7", "2.4")):
+        status, _, err = run(*common, *camera)
+        assert status == 0
+        assert "measure it from the table's frame" in err
+        assert "between 0.90 0.00 0.77 and 0.90 0.00 10.24" in err
+
+
 def drawn(path, size=(1920, 1080), ball=(1.05, 0.12), hoop=(1.0, 0.05)):
     """The table of `POINTS`, seen from straight above, in a picture of some size."""
     image, per_metre = Image.new("RGB", size, (200, 200, 200)), 750 * size[0] / 1920

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import tyro
@@ -25,6 +25,9 @@ from prior_reinforce.extras import check_installed
 from prior_reinforce.files import named_disk_errors, refuse_foreign, write
 from prior_reinforce.units import UNITS, looks_like
 from prior_reinforce.wording import to_words
+
+if TYPE_CHECKING:
+    from prior_reinforce.perception.calibration import TableCalibration
 
 _COLUMNS = ("x", "y", "u", "v")
 _COARSE = 0.02
@@ -86,6 +89,7 @@ class Calibrate:
         if self.outcome_height is not None:
             if self.camera is None:
                 raise ConfigurationError("--outcome-height needs --camera X Y Z, in metres")
+            _check_camera(calibration, self.outcome_height, self.camera)
             calibration = calibration.at_height(self.outcome_height, np.array(self.camera))
         calibration.save(self.out)
         print(f"{calibration.summary()}: {self.out}")
@@ -217,6 +221,25 @@ class Look:
                 )
             goal = state.goal_of(state.trial(self.trial)).goal
         return goal, folder / "pictures", f"trial-{self.trial:03d}-seen"
+
+
+def _check_camera(
+    calibration: TableCalibration, height: float, camera: tuple[float, float, float]
+) -> None:
+    """Warn of a camera that hangs elsewhere than the known points' perspective says."""
+    from prior_reinforce.perception.viewpoint import camera_costs, possible_places
+
+    cost = camera_costs(calibration, height, np.array(camera))
+    if cost > _COARSE:
+        first, last = possible_places(calibration)[[0, -1]]
+        ends = " and ".join(
+            " ".join(f"{round(c, 2) + 0:.2f}" for c in place) for place in (first, last)
+        )
+        warn(
+            f"--camera {' '.join(f'{c:g}' for c in camera)} does not fit how the points are seen: "
+            f"that is from between {ends}, which differs by {100 * cost:.1f} cm or more at "
+            f"{height:g} m; measure it from the table's frame (a picture that is cut tells wrongly)"
+        )
 
 
 def _photograph(camera: str, path: Path) -> None:
