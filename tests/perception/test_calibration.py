@@ -165,6 +165,19 @@ def test_a_calibration_is_of_a_picture_and_scaled_to_others_of_its_shape(tmp_pat
     assert again.at_height(0.1, CAMERA).picture == (1920, 1080)
 
 
+def test_a_picture_that_cannot_hold_the_points_is_another_one(tmp_path):
+    made = TableCalibration.fit(GRID, through_pinhole(at(GRID, 0.0)))
+    made.save(tmp_path / "table.json")
+    again = TableCalibration.load(tmp_path / "table.json")
+    u, v = through_pinhole(at(GRID, 0.0)).max(axis=0)
+    assert again.in_picture((int(u) + 5, int(v) + 5)) is again
+    for size in ((int(u) - 5, int(v) + 5), (int(u) + 5, int(v) - 5)):
+        with pytest.raises(
+            ConfigurationError, match=r"outside this picture.* turned or of another"
+        ):
+            again.in_picture(size)
+
+
 def test_the_spread_is_no_smaller_than_what_is_left_out():
     pixels = through_pinhole(at(GRID, 0.0))
     assert TableCalibration.fit(GRID, pixels).sd == CAMERA_SD

@@ -278,6 +278,15 @@ def test_a_server_that_shrinks_the_picture_gives_no_number(shrunk, calibration, 
     )
     assert reading.error_seen is None
     assert "max_image_side" in reading.problem
+    assert "as large as that" not in reading.problem  # that is known
+
+
+def test_a_picture_of_another_size_than_an_unknown_one_is_named_as_the_cause(calibration, picture):
+    unsized = replace(calibration, picture=None)
+    larger = np.asarray(Image.fromarray(picture).resize((960, 720)))
+    perception = VisionLanguageModel(SCENE, client=ColourClient(), calibration=unsized)
+    problem = perception.read(larger).problem
+    assert "is the picture as large as that in which the camera was calibrated" in problem
 
 
 @pytest.mark.parametrize(

@@ -190,6 +190,14 @@ class TableCalibration:
         Raises:
             ConfigurationError: It is turned, or of another shape, and so of another view.
         """
+        if self.picture is None and self.clicked is not None:
+            u, v = self.clicked[2:]
+            if u > size[0] or v > size[1]:
+                raise ConfigurationError(
+                    f"the camera was calibrated on points as far as ({u:.0f}, {v:.0f}) px, outside "
+                    f"this picture of {_by(size)}, which is turned or of another size; take it as "
+                    "before, or calibrate again with the picture in which they were clicked"
+                )
         if self.picture is None or size == self.picture:
             return self
         per_x, per_y = np.divide(size, self.picture)

@@ -190,11 +190,13 @@ class VisionLanguageModel(Perception):
             seen = "as flat as the picture"
         else:
             return goal
+        unsized = "is the picture as large as that in which the camera was calibrated, "
         return replace(
             goal,
             place=None,
-            problem=f"both objects look {seen}: is the model family set right, does the server "
-            "shrink pictures (then set max_image_side), are the sizes right?",
+            problem=f"both objects look {seen}: {unsized if calibration.picture is None else ''}"
+            "is the model family set right, does the server shrink pictures (then set "
+            "max_image_side), are the sizes right?",
         )
 
     def _swapped(self, box: Box, wide: float) -> Box:
