@@ -85,6 +85,7 @@ class Calibrate:
         if self.picture is not None:
             tall, wide, _ = read_picture(self.picture).shape
             size = wide, tall
+            _check_turn(self.picture, pixels, size)
         calibration = TableCalibration.fit(table_points, pixels, height=self.height, picture=size)
         if self.outcome_height is not None:
             if self.camera is None:
@@ -93,6 +94,11 @@ class Calibrate:
             calibration = calibration.at_height(self.outcome_height, np.array(self.camera))
         calibration.save(self.out)
         print(f"{calibration.summary()}: {self.out}")
+        if size is None:
+            warn(
+                "without --picture a photograph of another size, turned or cut is not told from "
+                "one of this camera; give the one in which u and v were clicked"
+            )
         _, others_off = left_out_errors(table_points, pixels)
         if calibration.sd > _COARSE:
             # Without the point that is wrong the others agree, where they are enough to disagree.
@@ -221,6 +227,26 @@ class Look:
                 )
             goal = state.goal_of(state.trial(self.trial)).goal
         return goal, folder / "pictures", f"trial-{self.trial:03d}-seen"
+
+
+def _check_turn(picture: Path, pixels: Float[np.ndarray, "n 2"], size: tuple[int, int]) -> None:
+    """Refuse points, or warn of them, that may be clicked in a picture as it is stored, turned."""
+    from prior_reinforce.perception.pictures import stored_turn
+
+    turn = stored_turn(picture)
+    upright, stored = (
+        bool(np.all((pixels >= 0) & (pixels <= sides)))
+        for sides in (size, size[::-1] if turn > 4 else size)
+    )
+    if turn == 1 or not stored:
+        return
+    says = f"{picture} is stored turned (EXIF orientation {turn})"
+    if not upright:
+        raise ConfigurationError(
+            f"{says}, and u and v were clicked in it as it is stored, but it is read upright, "
+            f"{size[0]} x {size[1]} px; save it upright as a PNG, click there, and give that"
+        )
+    warn(f"{says}; u and v must be clicked in it upright, as most viewers show it")
 
 
 def _check_camera(
