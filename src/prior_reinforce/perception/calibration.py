@@ -132,7 +132,8 @@ class TableCalibration:
         if picture is not None and not np.all((seen >= 0) & (seen <= picture)):
             raise ConfigurationError(
                 f"pixels up to {seen.max(axis=0).tolist()} lie outside a picture of "
-                f"{_by(picture)}; give the picture in which they were clicked"
+                f"{_by(picture)}; give the picture in which they were clicked, u to the right and "
+                "v down"
             )
         for what, given in (("place", points), ("pixel", seen)):
             _, index, often = np.unique(
@@ -360,10 +361,10 @@ def _worst_sd(
     by_h, by_place = moved(np.vstack([points, around[shown]]))
     of_pixels = (by_h @ by_pixels).reshape(2, len(by_place), -1).swapaxes(0, 1)
     sds = np.linalg.norm(np.linalg.solve(by_place, of_pixels), axis=2)
-    n_free = 2 * len(points) - 8
-    residual = np.linalg.norm(_map(homography, points) - pixels) / np.sqrt(max(n_free, 1))
+    n_free = max(2 * len(points) - 8, 1)  # of four points nothing is left over
+    residual = np.linalg.norm(_map(homography, points) - pixels) / np.sqrt(n_free)
     metre_per_pixel = to_unit_pixels[0, 0] / to_unit_points[0, 0]
-    return float(sds.max() * metre_per_pixel * max(_CLICK_SD, residual if n_free else 0.0))
+    return float(sds.max() * metre_per_pixel * max(_CLICK_SD, residual))
 
 
 def left_out_errors(
