@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.perception.calibration import TableCalibration
-from prior_reinforce.perception.viewpoint import camera_costs, possible_places
+from prior_reinforce.perception.viewpoint import camera_costs, miss_from, possible_places
 
 POINTS = np.array([(x, y) for x in (0.5, 0.85, 1.2) for y in (-0.4, 0.0, 0.4)])
 SIZE, FOCAL = (1280, 720), 1000.0
@@ -48,6 +48,32 @@ def test_a_steep_view_tells_the_height_and_one_from_straight_above_does_not():
     assert np.ptp(steep) < 0.3
     assert np.ptp(possible_places(above)[:, 2]) > 5
     assert camera_costs(above, 0.1, np.array([0.85, 0.0, 1.6])) < 0.005
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        0.7 + 0.15 * POINTS,  # 10 cm wide
+        POINTS[[0, 2, 6, 8]] * [1, 0.1],
+        POINTS * [0.1, 1] + [0.7, 0.0],
+    ],
+    ids=["small", "four on a strip", "strip across"],
+)
+def test_points_whose_perspective_is_lost_in_the_noise_accuse_no_camera(points):
+    camera, noise = np.array([0.8, 0.0, 2.4]), np.random.default_rng(0)
+    for tilt in (0.0, 0.1) * 10:
+        pixels = seen(points, camera, tilt)
+        pixels += noise.normal(size=pixels.shape)
+        calibration = TableCalibration.fit(points, pixels, picture=SIZE)
+        assert camera_costs(calibration, 0.1, camera + np.array([0.03, -0.03, 0.03])) == 0.0
+
+
+def test_the_points_are_seen_so_from_the_camera_and_not_from_elsewhere():
+    camera = np.array([0.0, 0.1, 2.2])
+    calibration = calibrated(camera, 0.4)
+    assert miss_from(calibration, camera) < 1.0  # f is tried in steps
+    assert miss_from(calibration, camera + np.array([0.7, 0.0, 0.0])) > 10
+    assert miss_from(calibrated(camera, 0.4, picture=None), camera) == 0.0
 
 
 def test_an_axis_a_little_beside_the_pictures_middle_is_no_other_camera():

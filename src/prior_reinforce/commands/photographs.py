@@ -256,7 +256,7 @@ def _check_camera(
     from prior_reinforce.perception.viewpoint import camera_costs, possible_places
 
     cost = camera_costs(calibration, height, np.array(camera))
-    if cost > _COARSE:
+    if cost > _COARSE >= calibration.sd:  # coarse points tell of no camera
         first, last = possible_places(calibration)[[0, -1]]
         ends = " and ".join(
             " ".join(f"{round(c, 2) + 0:.2f}" for c in place) for place in (first, last)

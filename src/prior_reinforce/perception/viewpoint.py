@@ -14,7 +14,7 @@ from jaxtyping import Float
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.perception.calibration import TableCalibration
 
-_FOCAL_LENGTHS = np.geomspace(0.3, 4.0, 60)
+_FOCAL_LENGTHS = np.geomspace(0.3, 4.0, 300)
 """Of cameras, in shares of the picture's longer side (ours): a view of 120 to 14 degrees."""
 _SLACK = 3.0
 """How much worse than the best another f may fit the points, in [px]; ours: three times what a
@@ -48,18 +48,43 @@ def possible_places(calibration: TableCalibration) -> Float[np.ndarray, "n 3"]:
     return np.array(places)[np.array(misses) <= min(misses) + _SLACK]
 
 
+def miss_from(calibration: TableCalibration, camera: Float[np.ndarray, "3"]) -> float:
+    """Return how far off a camera there sees the points, at least, in [px].
+
+    For each f it is turned as the rays want it. Source: Wahba's problem, solved by an SVD
+    (Markley, Journal of the Astronautical Sciences 36, 1988).
+    """
+    if calibration.picture is None or calibration.clicked is None:
+        return 0.0
+    corners, middle = _corners(calibration.clicked), np.array(calibration.picture) / 2
+    on_table = calibration.to_table(corners)
+    towards = np.column_stack([on_table, np.full(4, calibration.height)]) - camera
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    misses = []
+    for focal in _FOCAL_LENGTHS * max(calibration.picture):
+        rays = np.column_stack([corners - middle, np.full(4, focal)])
+        left, _, right = np.linalg.svd(rays.T @ towards)
+        turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+        seen = towards @ turn.T
+        misses.append(np.linalg.norm(focal * seen[:, :2] / seen[:, 2:] + middle - corners) / 2)
+    return float(min(misses))
+
+
 def camera_costs(
     calibration: TableCalibration, height: float, camera: Float[np.ndarray, "3"]
 ) -> float:
     """Return by how much places of a parallel plane are off, at least, if the camera hangs there.
 
-    Against where the perspective puts it, in [m], where the points are; 0 if that tells nothing.
+    Against where the perspective puts it, in [m], where the points are; 0 where a camera there sees
+    them within what a click is off, or nothing is known.
 
     Args:
         calibration: Of the points' own plane.
         height: Height of the other plane above the table, in [m].
         camera: Where it is said to hang, table frame, in [m].
     """
+    if not np.isfinite(camera).all() or miss_from(calibration, camera) <= _SLACK:
+        return 0.0
     costs = []
     for place in possible_places(calibration):
         with suppress(ConfigurationError):  # below a plane, or beyond any hall
