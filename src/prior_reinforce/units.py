@@ -161,4 +161,7 @@ def looks_like(unit: str, number: float, *, error: bool = False, stated: bool = 
         return ""
     if error:
         return known.spoken if known.error_limit <= abs(number) < math.inf else ""
-    return "" if abs(number) <= known.largest * (STATED if stated else 1.0) else known.spoken
+    if abs(number) <= known.largest * (STATED if stated else 1.0):
+        return ""
+    finer = known.small in UNITS and UNITS[known.spoken].largest < abs(number) < math.inf
+    return known.small if finer else known.spoken

@@ -66,7 +66,8 @@ def test_calibrate_replaces_only_what_it_wrote(tmp_path, run):
 @pytest.mark.parametrize(
     ("scale", "flags", "says"),
     [
-        (100, (), "looks like centimetres"),
+        (100, (), "100 m away looks like centimetres; write x [cm] and y [cm]"),
+        (1200, (), "1200 m away looks like millimetres; write x [mm] and y [mm]"),
         (1, ("--height", "nan"), "--height must be metres"),
         (1, ("--height", "10"), "--height must be metres"),
         (1, ("--outcome-height", "inf", "--camera", "0", "0", "2"), "--outcome-height must be"),
@@ -128,8 +129,8 @@ def test_the_photograph_is_taken_first(table, tmp_path, run):
     photo = Image.open(folder / "photo.png")
     photo.save(tmp_path / "photo.jpg")
     (tmp_path / "feed.mjpeg").write_bytes((tmp_path / "photo.jpg").read_bytes() * 3)
-    status, _, err = run("calibrate", folder / "points.csv", "--out", folder / "table.json")
-    assert (status, err) == (0, "")
+    of = ("--picture", folder / "photo.png", "--out", folder / "table.json")
+    assert run("calibrate", folder / "points.csv", *of)[::2] == (0, "")
     taken, feed = tmp_path / "taken.png", tmp_path / "feed.mjpeg"
     objects = ["--reached", "the orange ball", "--reached-size", "0.06", "--goal", "the red hoop"]
     objects += ["--goal-size", "0.1", "--calibration", folder / "table.json"]
@@ -250,7 +251,7 @@ def test_only_a_png_or_a_jpeg_is_opened(photographed, run, kind):
 
 
 def test_a_picture_of_several_frames_is_read_as_its_first(photographed, run):
-    frames = [Image.new("RGB", (20, 20), colour) for colour in ("red", "blue")]
+    frames = [Image.new("RGB", (120, 220), colour) for colour in ("red", "blue")]
     frames[0].save("photo.png", save_all=True, append_images=frames[1:])
     assert "is the server running?" in run(*photographed, *OBJECTS)[2]
 
@@ -305,7 +306,8 @@ def points_file(path, points=POINTS, names=("x", "y", "u", "v"), sep=",", dec=".
 def test_points_are_read_as_a_spreadsheet_writes_them(tmp_path, run, written):
     points = points_file(tmp_path / "points.csv", **written)
     status, out, err = run("calibrate", points, "--out", tmp_path / "table.json")
-    assert (status, err) == (0, "")
+    assert (status, err.count("\n")) == (0, 1)
+    assert "without --picture" in err
     assert "calibrated to 0.00 cm" in out
 
 
@@ -346,7 +348,24 @@ def test_a_coarse_calibration_names_its_worst_point(tmp_path, run):
     assert "2 (0.6, 0.1)" in err
     thin = [(0.6, 0.4, 660.3, 765.2), (0.605, 0, 960.4, 760.1), (0.6, -0.4, 1259.6, 764.9)]
     thin += [(0.61, 0.2, 810.2, 757.7), (0.6, 0.1, 885, 765.4)]
-    assert "coarse" in run("calibrate", points_file(points, thin), "--out", tmp_path / "t.json")[2]
+    said = run("calibrate", points_file(points, thin), "--out", tmp_path / "t.json")[2]
+    assert "that is coarse beside the points" in said
+    assert "beside" not in err
+
+
+def test_a_camera_that_was_measured_from_elsewhere_is_told(tmp_path, run):
+    """`POINTS` are seen from straight above (0.9, 0), at any height."""
+    points = points_file(tmp_path / "points.csv")
+    Image.new("RGB", (1920, 1080)).save(tmp_path / "table.png")
+    common = ("calibrate", points, "--picture", tmp_path / "table.png", "--outcome-height", "0.1")
+    common = (*common, "--out", tmp_path / "table.json", "--camera")
+    for camera in (("0.9", "0", "2.4"), ("0.85", "0.05", "2.3")):
+        assert run(*common, *camera)[::2] == (0, "")
+    for camera in (("0", "0", "1.2"), ("0.9", "0.7", "2.4")):
+        status, _, err = run(*common, *camera)
+        assert status == 0
+        assert "measure it from the table's frame" in err
+        assert "between 0.90 0.00 0.77 and 0.90 0.00 10.24" in err
 
 
 def drawn(path, size=(1920, 1080), ball=(1.05, 0.12), hoop=(1.0, 0.05)):
@@ -383,6 +402,35 @@ def test_a_picture_of_another_size_is_scaled_or_refused(drawn_table, capsys):
         drawn(drawn_table / "photo.png", (1080, 1920))
         assert look(drawn_table, server.base_url) == 2
         assert "1920 x 1080 px" in capsys.readouterr().err
+
+
+def test_points_that_were_clicked_in_a_picture_as_it_is_stored_are_told(tmp_path, run):
+    """A telephone's: 1920 x 1080 px as stored, upright 1080 x 1920 px."""
+    drawn(tmp_path / "photo.png")
+    exif = Image.Exif()
+    common = ("calibrate", tmp_path / "points.csv", "--out", tmp_path / "table.json", "--picture")
+
+    def photographed(name, turn):
+        exif[0x0112] = turn
+        Image.open(tmp_path / "photo.png").save(tmp_path / name, exif=exif)
+        return tmp_path / name
+
+    turned = photographed("turned.jpg", 6)
+    points_file(tmp_path / "points.csv")
+    status, _, err = run(*common, turned)
+    assert status == 2
+    assert "EXIF orientation 6" in err
+    assert "save it upright as a PNG, click there" in err
+    upright = [(x, y, 1080 - v, u) for x, y, u, v in POINTS]
+    points_file(tmp_path / "points.csv", upright)
+    Image.open(turned).transpose(Image.Transpose.ROTATE_270).save(tmp_path / "upright.png")
+    assert run(*common, tmp_path / "upright.png")[::2] == (0, "")
+    assert run(*common, turned)[::2] == (0, "")
+    points_file(tmp_path / "points.csv")
+    status, _, err = run(*common, photographed("down.jpg", 3))  # inside it either way
+    assert status == 0
+    assert "EXIF orientation 3" in err
+    assert run(*common, photographed("straight.jpg", 1))[::2] == (0, "")
 
 
 def test_what_is_told_is_no_surer_than_the_calibration(drawn_table, capsys, run):

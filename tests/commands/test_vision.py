@@ -22,6 +22,7 @@ def test_a_file_says_it_before_the_manifest_and_that_before_the_default(tmp_path
     assert model_of(file, tmp_path) == VisionLanguageModelConfig(
         votes=5, leave_out=("temperature",)
     )
+    assert VisionLanguageModelConfig.load(str(file)).votes == 5
 
 
 @pytest.mark.parametrize(

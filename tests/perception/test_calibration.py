@@ -11,6 +11,7 @@ from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.perception.calibration import (
     CAMERA_SD,
     TableCalibration,
+    _direct_linear_transform,
     left_out_errors,
 )
 
@@ -118,8 +119,8 @@ def test_a_camera_below_the_plane_is_refused():
 def test_a_saved_calibration_comes_back(tmp_path):
     made = TableCalibration.fit(GRID, through_pinhole(at(GRID, 0.1)).round(), height=0.1)
     made = made.at_height(0.05, CAMERA)
-    made.save(tmp_path / "table.json")
-    loaded = TableCalibration.load(tmp_path / "table.json")
+    made.save(f"{tmp_path}/table.json")
+    loaded = TableCalibration.load(f"{tmp_path}/table.json")
     np.testing.assert_array_equal(loaded.homography, made.homography)
     assert loaded.summary() == made.summary()
     assert (loaded.height, loaded.fit_error) == (made.height, made.fit_error)
@@ -164,6 +165,19 @@ def test_a_calibration_is_of_a_picture_and_scaled_to_others_of_its_shape(tmp_pat
     assert again.at_height(0.1, CAMERA).picture == (1920, 1080)
 
 
+def test_a_picture_that_cannot_hold_the_points_is_another_one(tmp_path):
+    made = TableCalibration.fit(GRID, through_pinhole(at(GRID, 0.0)))
+    made.save(tmp_path / "table.json")
+    again = TableCalibration.load(tmp_path / "table.json")
+    u, v = through_pinhole(at(GRID, 0.0)).max(axis=0)
+    assert again.in_picture((int(u) + 5, int(v) + 5)) is again
+    for size in ((int(u) - 5, int(v) + 5), (int(u) + 5, int(v) - 5)):
+        with pytest.raises(
+            ConfigurationError, match=r"outside this picture.* turned or of another"
+        ):
+            again.in_picture(size)
+
+
 def test_the_spread_is_no_smaller_than_what_is_left_out():
     pixels = through_pinhole(at(GRID, 0.0))
     assert TableCalibration.fit(GRID, pixels).sd == CAMERA_SD
@@ -174,6 +188,57 @@ def test_the_spread_is_no_smaller_than_what_is_left_out():
     off, others_off = left_out_errors(typed, pixels)
     assert np.argmin(others_off) == 1
     assert off[1] > 0.08
+
+
+@pytest.mark.parametrize("aside", [0.01, 0.05, 0.2])
+def test_what_points_near_a_line_leave_open_beside_it_is_stated(aside):
+    """Over fits to noisy pixels, places in the square spread no wider than is said."""
+    line = np.column_stack([np.linspace(0.4, 1.2, 6), aside * np.array([0, 1, -1, 1, 0, -1])])
+    pixels = through_pinhole(at(line, 0.0))
+    stated = TableCalibration.fit(line, pixels).worst_sd
+    around = np.array([(x, y) for x in (0.4, 0.8, 1.2) for y in (-0.4, 0.0, 0.4)])
+    noise = np.random.default_rng(0).normal(size=(300, *pixels.shape)) / 5  # still linear
+    seen = [
+        TableCalibration(_direct_linear_transform(line, pixels + n), 0.0, 0.0, None).to_table(
+            through_pinhole(at(around, 0.0))
+        )
+        for n in noise
+    ]
+    assert np.std(seen, axis=0).max() * 5 == pytest.approx(stated, rel=0.25)
+    assert (stated > 0.02) == (aside < 0.1)
+
+
+def test_a_summary_states_the_worst_place_and_a_file_keeps_it(tmp_path):
+    thin = GRID * [1, 0.02]
+    made = TableCalibration.fit(thin, through_pinhole(at(thin, 0.0)))
+    assert made.sd == made.worst_sd > 0.05
+    assert f"{100 * made.worst_sd:.2f} cm at worst" in made.summary()
+    made.save(tmp_path / "table.json")
+    assert TableCalibration.load(tmp_path / "table.json").sd == made.sd
+    assert made.at_height(0.1, CAMERA).sd < made.sd  # nearer to the camera
+    content = json.loads((tmp_path / "table.json").read_text())
+    del content["worst_sd_m"], content["clicked_px"]  # as before they were stated
+    (tmp_path / "table.json").write_text(json.dumps(content))
+    assert TableCalibration.load(tmp_path / "table.json").sd == CAMERA_SD
+
+
+def test_noisy_pixels_show_in_the_worst_place_and_only_what_the_picture_shows_counts():
+    pixels = through_pinhole(at(GRID, 0.0))
+    noise = np.random.default_rng(0).normal(size=pixels.shape)
+    fine, rough = (TableCalibration.fit(GRID, pixels + k * noise) for k in (1, 8))
+    assert rough.worst_sd > 4 * fine.worst_sd
+    strip = GRID * [1, 0.2]
+    cut = tuple(through_pinhole(at(strip, 0.0)).max(axis=0).astype(int) + 5)
+    whole = TableCalibration.fit(strip, through_pinhole(at(strip, 0.0)))
+    shown = TableCalibration.fit(strip, through_pinhole(at(strip, 0.0)), picture=cut)
+    assert shown.worst_sd < whole.worst_sd
+
+
+def test_pixels_in_shares_of_the_pictures_sides_are_named():
+    pixels = through_pinhole(at(GRID, 0.0)) / [1280, 720]
+    with pytest.raises(ConfigurationError, match="multiply u by its width and v by its height"):
+        TableCalibration.fit(GRID, pixels, picture=(1280, 720))
+    TableCalibration.fit(GRID, pixels * [1280, 720])
 
 
 @pytest.mark.parametrize("what", ["place", "pixel"])

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from prior_reinforce.errors import FileFormatError
-from prior_reinforce.perception.pictures import read_picture
+from prior_reinforce.perception.pictures import read_picture, stored_turn
 
 
 def saved(image, kind="PNG", **how):
@@ -39,10 +39,17 @@ def test_any_mode_becomes_three_colours(mode):
 def test_a_picture_taken_upright_is_turned_upright():
     turned = Image.Exif()
     turned[0x0112] = 6
-    assert read_picture(saved(Image.new("RGB", (40, 20)), "JPEG", exif=turned)).shape[:2] == (
-        40,
-        20,
-    )
+    file = saved(Image.new("RGB", (40, 20)), "JPEG", exif=turned)
+    assert read_picture(file).shape[:2] == (40, 20)
+
+
+@pytest.mark.parametrize(("written", "said"), [(None, 1), (1, 1), (3, 3), (8, 8), (0, 1), (77, 1)])
+def test_how_a_picture_is_stored_is_told(tmp_path, written, said):
+    exif = Image.Exif()
+    if written is not None:
+        exif[0x0112] = written
+    Image.new("RGB", (40, 20)).save(tmp_path / "a.jpg", exif=exif)
+    assert stored_turn(tmp_path / "a.jpg") == said
 
 
 def test_what_is_none_is_named(tmp_path):

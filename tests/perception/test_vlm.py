@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from PIL import Image
 from prior_reinforce.environment import Rollout, TableScene
 from prior_reinforce.errors import ConfigurationError, EndpointError, PerceptionFailedError
 from prior_reinforce.perception.camera import Camera, CameraConfig
-from prior_reinforce.perception.colour_camera import ColourClient, find_by_colour
+from prior_reinforce.perception.colour_camera import ColourClient, find_by_colour, say_box
 from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from prior_reinforce.perception.vlm_reading import Answer
@@ -187,6 +188,81 @@ def test_another_scale_than_the_familys_gives_no_number(
         assert "family" in reading.problem
 
 
+class Says(ColourClient):
+    """Says the boxes in another order or of another size."""
+
+    def __init__(self, said="glm-4.5v", *, swaps=False, loose=((1, 1), (1, 1))):
+        super().__init__(said)
+        self.said, self.swaps, self.loose = said, swaps, loose
+
+    def ask(self, words, picture):
+        size = picture.shape[1], picture.shape[0]
+        left, top, right, bottom = find_by_colour(picture, words)
+        wide, tall = np.multiply(self.loose[int("ring" in words)], (right - left, bottom - top)) / 2
+        x, y = (left + right) / 2, (top + bottom) / 2
+        said = say_box((x - wide, y - tall, x + wide, y + tall), size, words, self.said)
+        if self.swaps:
+            said = re.sub(r"(\d+), (\d+), (\d+), (\d+)", r"\2, \1, \4, \3", said)
+        return Answer(said, None, "stop")
+
+
+@pytest.fixture(scope="module")
+def wide(table_model, frame_with_ball_at):
+    """A picture of 16 : 9 with its calibration."""
+    with_camera = Camera(CameraConfig(width=960, height=540))
+    calibration = with_camera.calibrate(table_model, np.array(SCENE.marks), height=RIM_HEIGHT)
+    picture = with_camera.picture(frame_with_ball_at(*BALL), GOAL)
+    with_camera.close()
+    return picture, calibration
+
+
+LOOSE = [((1, 1), (1, 1)), ((1.2, 1.2), (1.2, 1.2)), ((0.85, 1.15), (1.1, 0.9))]
+
+
+@pytest.mark.parametrize("loose", LOOSE)
+@pytest.mark.parametrize(
+    ("said", "believed", "remedy"),
+    [
+        ("glm-4.5v", "glm-4.5v", "gemini"),
+        ("qwen3-vl", "qwen3-vl", "gemini"),
+        ("gemini", "gemini", "glm-4.5v or qwen2-vl or qwen3-vl"),
+    ],
+)
+def test_boxes_with_x_and_y_swapped_give_no_number_and_name_the_families(
+    said, believed, remedy, loose, wide
+):
+    picture, calibration = wide
+    client, how = Says(said, swaps=True, loose=loose), VisionLanguageModelConfig(family=believed)
+    perception = VisionLanguageModel(SCENE, how, client=client, calibration=calibration)
+    reading = perception.read(picture)
+    assert reading.error_seen is None
+    assert "only with x and y swapped" in reading.problem
+    assert reading.problem.rstrip(")").endswith(f"set family to {remedy}")
+
+
+def test_the_family_that_is_named_for_swapped_boxes_reads_them(wide):
+    picture, calibration = wide
+    how = VisionLanguageModelConfig(family="gemini")
+    client = Says("glm-4.5v", swaps=True)
+    perception = VisionLanguageModel(SCENE, how, client=client, calibration=calibration)
+    np.testing.assert_allclose(perception.read(picture).error_seen, BALL - GOAL, atol=0.004)
+
+
+@pytest.mark.parametrize("size", [(960, 540), (640, 480), (600, 480), (720, 480)])
+def test_loose_boxes_in_the_right_order_are_not_taken_for_swapped_ones(
+    size, table_model, frame_with_ball_at
+):
+    with_camera = Camera(CameraConfig(width=size[0], height=size[1]))
+    calibration = with_camera.calibrate(table_model, np.array(SCENE.marks), height=RIM_HEIGHT)
+    picture = with_camera.picture(frame_with_ball_at(*BALL), GOAL)
+    with_camera.close()
+    how = VisionLanguageModelConfig(votes=1, spread_gate=1.0)
+    for loose in np.random.default_rng(0).uniform(0.75, 1.3, size=(40, 2, 2)):
+        client = Says(loose=loose)
+        perception = VisionLanguageModel(SCENE, how, client=client, calibration=calibration)
+        assert "swapped" not in (perception.read(picture).problem or "")
+
+
 @pytest.mark.parametrize("shrunk", [0.5, 0.65, 0.8])
 def test_a_server_that_shrinks_the_picture_gives_no_number(shrunk, calibration, picture):
     class Shrinks(ColourClient):
@@ -202,6 +278,15 @@ def test_a_server_that_shrinks_the_picture_gives_no_number(shrunk, calibration, 
     )
     assert reading.error_seen is None
     assert "max_image_side" in reading.problem
+    assert "as large as that" not in reading.problem  # that is known
+
+
+def test_a_picture_of_another_size_than_an_unknown_one_is_named_as_the_cause(calibration, picture):
+    unsized = replace(calibration, picture=None)
+    larger = np.asarray(Image.fromarray(picture).resize((960, 720)))
+    perception = VisionLanguageModel(SCENE, client=ColourClient(), calibration=unsized)
+    problem = perception.read(larger).problem
+    assert "is the picture as large as that in which the camera was calibrated" in problem
 
 
 @pytest.mark.parametrize(

@@ -156,6 +156,33 @@ def body(content, **head):
     return OK + more.encode() + f"Content-Length: {len(data)}\r\n\r\n".encode() + data
 
 
+@pytest.mark.parametrize(
+    "refusal",
+    [
+        {"error": "quota exceeded"},
+        {"error": {"message": "quota exceeded", "code": 1113}},
+        {"choices": [], "error": {"message": "quota exceeded"}},
+        {"detail": "quota exceeded"},
+        {"message": "quota exceeded"},
+    ],
+)
+def test_a_refusal_with_http_200_is_told_in_the_servers_words(refusal):
+    with (
+        endpoint(lambda file: file.write(body(refusal))) as (address, _),
+        pytest.raises(EndpointError, match="refuses with HTTP 200: quota exceeded; see"),
+    ):
+        ask(address)
+
+
+def test_what_is_no_completion_is_shown_as_it_came():
+    native = {"candidates": [{"content": "It is there."}], "error": None}
+    with (
+        endpoint(lambda file: file.write(body(native))) as (address, _),
+        pytest.raises(EndpointError, match=r'completion \(\{"candidates": .*ends in /v1'),
+    ):
+        ask(address)
+
+
 def test_the_picture_goes_to_no_other_host():
     with endpoint(lambda file: file.write(body({}))) as (elsewhere, requests):
         moved = f"Moved\r\nLocation: http://{elsewhere}".encode()

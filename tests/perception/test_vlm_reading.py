@@ -15,7 +15,7 @@ def test_the_record_keeps_every_answer_and_draws_the_boxes(looking, picture, tmp
         perception = looking(server)
         reading = perception.read(picture)
     assert perception.last_reading is reading
-    reading.save(tmp_path, "trial-3")
+    reading.save(str(tmp_path), "trial-3")
     record = json.loads((tmp_path / "trial-3.json").read_text())
     answers = record["reached"]["answers"]
     assert [bool(answer["problem"]) for answer in answers] == [False, False, True, False]

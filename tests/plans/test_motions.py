@@ -236,8 +236,10 @@ def test_outcomes_that_look_alike_by_eye_are_kept_without_a_word():
 
 def test_metres_are_doubted_sooner_where_nobody_said_them():
     far = [[10.0, 0.2], [16.0, 0.1], [22.0, 0.3], [28.0, 0.5]]
-    with pytest.warns(UserWarning, match="28 m looks like centimetres"):
+    with pytest.warns(UserWarning, match=r"28 m looks like centimetres.* divide by 100$"):
         make(outcomes_seen=far)
+    with pytest.warns(UserWarning, match=r"840 m looks like millimetres.* divide by 1000$"):
+        make(outcomes_seen=30 * np.array(far))
     assert make(outcomes_seen=far, outcome_format=OutcomeFormat.metres(2)).n == 4
 
 

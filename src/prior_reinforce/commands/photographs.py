@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import tyro
@@ -23,12 +23,18 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.extras import check_installed
 from prior_reinforce.files import named_disk_errors, refuse_foreign, write
-from prior_reinforce.units import looks_like
+from prior_reinforce.units import UNITS, looks_like
 from prior_reinforce.wording import to_words
+
+if TYPE_CHECKING:
+    from prior_reinforce.perception.calibration import TableCalibration
 
 _COLUMNS = ("x", "y", "u", "v")
 _COARSE = 0.02
 """Spread of a calibration that is warned of, in [m]; ours: more than any task's tolerance."""
+_BESIDE = 5.0
+"""From how many times the points' own errors on the points fix no places beside them; ours: it is
+1 to 3 where they stand in the corners of the table, with a wrong one or without."""
 _EXPOSURE = 10
 """Frames, of which the last is kept; ours: the first are dark until a webcam has set itself."""
 _SAME_GOAL, _OTHER_GOAL = 0.02, 0.15
@@ -70,22 +76,29 @@ class Calibrate:
             if height is not None and looks_like("m", height):
                 raise ConfigurationError(f"--{name} must be metres above the table, got {height}")
         table_points, pixels = np.hsplit(_read_points(self.points), 2)
-        if looks_like("m", np.abs(table_points).max(initial=0.0)):
+        if looks := looks_like("m", np.abs(table_points).max(initial=0.0)):
             raise ConfigurationError(
-                f"a point {np.abs(table_points).max():g} m away looks like centimetres; x and y "
-                "must be metres"
+                f"a point {np.abs(table_points).max():g} m away looks like {UNITS[looks].plural}; "
+                f"write x [{looks}] and y [{looks}] in the head, or metres"
             )
         size = None
         if self.picture is not None:
             tall, wide, _ = read_picture(self.picture).shape
             size = wide, tall
+            _check_turn(self.picture, pixels, size)
         calibration = TableCalibration.fit(table_points, pixels, height=self.height, picture=size)
         if self.outcome_height is not None:
             if self.camera is None:
                 raise ConfigurationError("--outcome-height needs --camera X Y Z, in metres")
+            _check_camera(calibration, self.outcome_height, self.camera)
             calibration = calibration.at_height(self.outcome_height, np.array(self.camera))
         calibration.save(self.out)
         print(f"{calibration.summary()}: {self.out}")
+        if size is None:
+            warn(
+                "without --picture a photograph of another size, turned or cut is not told from "
+                "one of this camera; give the one in which u and v were clicked"
+            )
         _, others_off = left_out_errors(table_points, pixels)
         if calibration.sd > _COARSE:
             # Without the point that is wrong the others agree, where they are enough to disagree.
@@ -95,11 +108,13 @@ class Calibrate:
                 for i, (x, y) in enumerate(table_points.tolist())
                 if agree[i]
             )
-            warn(
-                f"that is coarse; without point {says} the others agree: measure and click it again"
-                if 0 < agree.sum() <= len(agree) / 2
-                else "that is coarse; give more points, in all corners of the table"
-            )
+            if calibration.worst_sd > max(_COARSE, _BESIDE * calibration.fit_error):
+                remedy = " beside the points; give more, in all corners of the table"
+            elif 0 < agree.sum() <= len(agree) / 2:
+                remedy = f"; without point {says} the others agree: measure and click it again"
+            else:
+                remedy = "; give more points, in all corners of the table"
+            warn(f"that is coarse{remedy}")
 
 
 @dataclass(frozen=True)
@@ -212,6 +227,45 @@ class Look:
                 )
             goal = state.goal_of(state.trial(self.trial)).goal
         return goal, folder / "pictures", f"trial-{self.trial:03d}-seen"
+
+
+def _check_turn(picture: Path, pixels: Float[np.ndarray, "n 2"], size: tuple[int, int]) -> None:
+    """Refuse points, or warn of them, that may be clicked in a picture as it is stored, turned."""
+    from prior_reinforce.perception.pictures import stored_turn
+
+    turn = stored_turn(picture)
+    upright, stored = (
+        bool(np.all((pixels >= 0) & (pixels <= sides)))
+        for sides in (size, size[::-1] if turn > 4 else size)
+    )
+    if turn == 1 or not stored:
+        return
+    says = f"{picture} is stored turned (EXIF orientation {turn})"
+    if not upright:
+        raise ConfigurationError(
+            f"{says}, and u and v were clicked in it as it is stored, but it is read upright, "
+            f"{size[0]} x {size[1]} px; save it upright as a PNG, click there, and give that"
+        )
+    warn(f"{says}; u and v must be clicked in it upright, as most viewers show it")
+
+
+def _check_camera(
+    calibration: TableCalibration, height: float, camera: tuple[float, float, float]
+) -> None:
+    """Warn of a camera that hangs elsewhere than the known points' perspective says."""
+    from prior_reinforce.perception.viewpoint import camera_costs, possible_places
+
+    cost = camera_costs(calibration, height, np.array(camera))
+    if cost > _COARSE >= calibration.sd:  # coarse points tell of no camera
+        first, last = possible_places(calibration)[[0, -1]]
+        ends = " and ".join(
+            " ".join(f"{round(c, 2) + 0:.2f}" for c in place) for place in (first, last)
+        )
+        warn(
+            f"--camera {' '.join(f'{c:g}' for c in camera)} does not fit how the points are seen: "
+            f"that is from between {ends}, which differs by {100 * cost:.1f} cm or more at "
+            f"{height:g} m; measure it from the table's frame (a picture that is cut tells wrongly)"
+        )
 
 
 def _photograph(camera: str, path: Path) -> None:

@@ -10,6 +10,7 @@ down, and the first pixel's centre is (0.5, 0.5).
 from __future__ import annotations
 
 import json
+import os
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -38,6 +39,8 @@ class _Saved(msgspec.Struct):
     height_m: float
     fit_error_m: float
     left_out_error_m: float | None
+    worst_sd_m: float = 0.0
+    clicked_px: tuple[float, float, float, float] | None = None
 
 
 # Singular values of the design matrix below this share of the largest count as zero: points on
@@ -50,6 +53,11 @@ CAMERA_SD = 0.003
 """Least standard deviation of each component of a place that is read from a picture, in [m] (ours):
 twice what `reproduction/benchmarks/vlm_accuracy.py` finds where objects are found by colour; no
 model was measured."""
+_CLICK_SD = 1.0
+"""Least standard deviation of a known point's pixel, in [px]; ours: nobody clicks finer."""
+_SHARES = 2.0
+"""All points within so many pixels are said in shares of the picture's sides, in [px]; ours: from
+there nothing could be calibrated."""
 _HIGHEST = 20.0
 """Largest height of a camera above a table, in [m]; ours: beyond any hall, and below any height in
 centimetres."""
@@ -76,11 +84,16 @@ class TableCalibration:
     a point that was not clicked. None where there were only four points."""
     picture: tuple[int, int] | None = None
     """Width and height of the upright picture, in [px]; None where nobody said."""
+    worst_sd: float = 0.0
+    """Largest standard deviation of a component of a place, in [m], in the square around the points
+    that is as wide as they are, as far as the picture shows it. Zero where nobody said."""
+    clicked: tuple[float, float, float, float] | None = None
+    """Box around the points' pixels: left, top, right, bottom; None where nobody said."""
 
     @property
     def sd(self) -> float:
-        """Standard deviation of each component of a place, in [m]: `CAMERA_SD`, or the left out."""
-        return max(CAMERA_SD, self.fit_error, self.left_out_error or 0.0)
+        """Standard deviation of each component of a place, in [m]: the largest that is known."""
+        return max(CAMERA_SD, self.fit_error, self.left_out_error or 0.0, self.worst_sd)
 
     @classmethod
     def fit(
@@ -119,7 +132,8 @@ class TableCalibration:
         if picture is not None and not np.all((seen >= 0) & (seen <= picture)):
             raise ConfigurationError(
                 f"pixels up to {seen.max(axis=0).tolist()} lie outside a picture of "
-                f"{_by(picture)}; give the picture in which they were clicked"
+                f"{_by(picture)}; give the picture in which they were clicked, u to the right and "
+                "v down"
             )
         for what, given in (("place", points), ("pixel", seen)):
             _, index, often = np.unique(
@@ -131,11 +145,19 @@ class TableCalibration:
                     f"calibration points {' and '.join(map(str, twice[:9] + 1))} have one {what} "
                     "twice, or are the same; give each point once"
                 )
+        spread = float(np.ptp(seen, axis=0).max())
+        if spread <= _SHARES:
+            raise ConfigurationError(
+                f"all u and v lie within {spread:.2g} px, as shares of a picture's sides do; "
+                "multiply u by its width and v by its height, in pixels"
+            )
         homography = _direct_linear_transform(points, seen)
         fit_error = _rms(_map(np.linalg.inv(homography), seen) - points)
         misses, _ = left_out_errors(points, seen)
         left_out = None if np.isnan(misses).all() else float(np.sqrt(np.nanmean(misses**2)))
-        return cls(homography, float(height), fit_error, left_out, picture)
+        worst = _worst_sd(homography, points, seen, picture)
+        clicked = *seen.min(axis=0).tolist(), *seen.max(axis=0).tolist()
+        return cls(homography, float(height), fit_error, left_out, picture, worst, clicked)
 
     def to_table(self, pixels: ArrayLike) -> Float[np.ndarray, "*n 2"]:
         """Map pixels, shape (..., 2), to points in the plane, in [m]."""
@@ -169,6 +191,14 @@ class TableCalibration:
         Raises:
             ConfigurationError: It is turned, or of another shape, and so of another view.
         """
+        if self.picture is None and self.clicked is not None:
+            u, v = self.clicked[2:]
+            if u > size[0] or v > size[1]:
+                raise ConfigurationError(
+                    f"the camera was calibrated on points as far as ({u:.0f}, {v:.0f}) px, outside "
+                    f"this picture of {_by(size)}, which is turned or of another size; take it as "
+                    "before, or calibrate again with the picture in which they were clicked"
+                )
         if self.picture is None or size == self.picture:
             return self
         per_x, per_y = np.divide(size, self.picture)
@@ -209,20 +239,26 @@ class TableCalibration:
         from_new_plane[:2, 2] = (1 - scale) * camera[:2]
         homography = self.homography @ from_new_plane
         homography /= np.linalg.norm(homography)
-        left_out = None if self.left_out_error is None else self.left_out_error / scale
-        fit_error = self.fit_error / scale
-        return TableCalibration(homography, float(height), fit_error, left_out, self.picture)
+        return replace(
+            self,
+            homography=homography,
+            height=float(height),
+            fit_error=self.fit_error / scale,
+            left_out_error=None if self.left_out_error is None else self.left_out_error / scale,
+            worst_sd=self.worst_sd / scale,
+        )
 
     def summary(self) -> str:
         """One line for the operator, in centimetres."""
+        beside = f"{100 * self.worst_sd:.2f} cm at worst in the square around them"
         if self.left_out_error is None:
-            return "calibrated on four points; a fifth would tell how well"
+            return f"calibrated on four points, {beside}; a fifth would tell how well"
         return (
-            f"calibrated to {100 * self.left_out_error:.2f} cm "
-            f"(each point through the others), plane {100 * self.height:.1f} cm above the table"
+            f"calibrated to {100 * self.left_out_error:.2f} cm (each point through the others), "
+            f"{beside}, plane {100 * self.height:.1f} cm above the table"
         )
 
-    def save(self, path: Path) -> None:
+    def save(self, path: str | os.PathLike[str]) -> None:
         """Write the calibration as JSON."""
         saved = {
             "kind": "prior-reinforce table calibration 2",
@@ -231,36 +267,41 @@ class TableCalibration:
             "height_m": self.height,
             "fit_error_m": self.fit_error,
             "left_out_error_m": self.left_out_error,
+            "worst_sd_m": self.worst_sd,
+            "clicked_px": self.clicked,
         }
-        files.write(path, json.dumps(saved, indent=2) + "\n")
+        files.write(Path(path), json.dumps(saved, indent=2) + "\n")
 
     @classmethod
-    def load(cls, path: Path) -> TableCalibration:
+    def load(cls, path: str | os.PathLike[str]) -> TableCalibration:
         """Read what `save` wrote.
 
         Raises:
             FileFormatError: The file is missing or is not a calibration.
         """
         try:
-            saved = msgspec.json.decode(path.read_bytes(), type=_Saved)
+            saved = msgspec.json.decode(Path(path).read_bytes(), type=_Saved)
             np.linalg.inv(saved.homography)
         except (OSError, ValueError, np.linalg.LinAlgError) as error:
             raise FileFormatError(
                 f"{path} is not a table calibration ({error}); write one with TableCalibration.save"
             ) from error
-        homography = np.array(saved.homography)
-        errors = saved.fit_error_m, saved.left_out_error_m
-        return cls(homography, saved.height_m, *errors, saved.picture_px)
+        return cls(
+            np.array(saved.homography),
+            saved.height_m,
+            saved.fit_error_m,
+            saved.left_out_error_m,
+            saved.picture_px,
+            saved.worst_sd_m,
+            saved.clicked_px,
+        )
 
 
 def _direct_linear_transform(points: _Pairs, pixels: _Pairs) -> Float[np.ndarray, "3 3"]:
     """Least algebraic error H with unit norm."""
     to_unit_points, to_unit_pixels = _similarity_to_unit(points), _similarity_to_unit(pixels)
     table = np.insert(_map(to_unit_points, points), 2, 1.0, axis=1)
-    u, v = _map(to_unit_pixels, pixels).T[:, :, None]
-    none = np.zeros_like(table)
-    design = np.block([[table, none, -u * table], [none, table, -v * table]])
-    _, singular_values, right = np.linalg.svd(design)
+    _, singular_values, right = np.linalg.svd(_design(table, _map(to_unit_pixels, pixels)))
     if singular_values[7] < _RANK_FLOOR * singular_values[0]:
         raise ConfigurationError(
             f"{len(points)} calibration points (nearly) on one line do not fix a plane; spread "
@@ -279,6 +320,51 @@ def _direct_linear_transform(points: _Pairs, pixels: _Pairs) -> Float[np.ndarray
             "pixels in the points' order, with the table's x forward and y left"
         )
     return homography
+
+
+def _design(table: Float[np.ndarray, "n 3"], pixels: _Pairs) -> Float[np.ndarray, "2*n 9"]:
+    """Rows that are zero times H: of all u, then of all v."""
+    none, (u, v) = np.zeros_like(table), pixels.T[:, :, None]
+    return np.block([[table, none, -u * table], [none, table, -v * table]])
+
+
+def _worst_sd(
+    homography: Float[np.ndarray, "3 3"],
+    points: _Pairs,
+    pixels: _Pairs,
+    picture: tuple[int, int] | None,
+) -> float:
+    """Largest standard deviation of a component around the points, in [m].
+
+    The pixels' noise, as their residuals show it and at least `_CLICK_SD`, moves H, and so the
+    place of a pixel, to first order. Source: Hartley and Zisserman, 2nd ed., section 5.2.
+    """
+    to_unit_points, to_unit_pixels = _similarity_to_unit(points), _similarity_to_unit(pixels)
+    unit = to_unit_pixels @ homography @ np.linalg.inv(to_unit_points)
+    middle, half = (points.min(axis=0) + points.max(axis=0)) / 2, np.ptp(points, axis=0).max() / 2
+    grid = np.stack(np.meshgrid(*2 * [np.linspace(-half, half, 9)]), axis=-1).reshape(-1, 2)
+    around = middle + grid
+    seen = _map(homography, around)
+    shown = around @ homography[2, :2] + homography[2, 2] > 0
+    if picture is not None:
+        shown &= ((seen >= 0) & (seen <= picture)).all(axis=1)
+
+    def moved(places: _Pairs) -> tuple[Float[np.ndarray, "2*n 9"], Float[np.ndarray, "n 2 2"]]:
+        """How H and the place move each pixel."""
+        table = np.insert(_map(to_unit_points, places), 2, 1.0, axis=1)
+        table /= (table @ unit[2])[:, None]
+        at = table @ unit[:2].T
+        by_place = (unit[:2, :2] - at[:, :, None] * unit[2, :2]) * table[:, 2, None, None]
+        return _design(table, at), by_place
+
+    by_pixels = np.linalg.pinv(moved(points)[0], rcond=_RANK_FLOOR**2)
+    by_h, by_place = moved(np.vstack([points, around[shown]]))
+    of_pixels = (by_h @ by_pixels).reshape(2, len(by_place), -1).swapaxes(0, 1)
+    sds = np.linalg.norm(np.linalg.solve(by_place, of_pixels), axis=2)
+    n_free = max(2 * len(points) - 8, 1)  # of four points nothing is left over
+    residual = np.linalg.norm(_map(homography, points) - pixels) / np.sqrt(n_free)
+    metre_per_pixel = to_unit_pixels[0, 0] / to_unit_points[0, 0]
+    return float(sds.max() * metre_per_pixel * max(_CLICK_SD, residual))
 
 
 def left_out_errors(

@@ -14,6 +14,20 @@ _MOST_PIXELS = 50_000_000
 """Of a photograph; ours: four times a telephone's."""
 
 
+_ORIENTATION = 0x0112
+"""EXIF's tag for how a picture is stored: 1 upright, 2 to 4 mirrored or upside down, 5 to 8 with
+its sides swapped (CIPA DC-008, 4.6.4)."""
+
+
+def stored_turn(path: Path) -> int:
+    """Return how a picture that can be read is stored: its EXIF orientation, 1 for upright."""
+    from PIL import Image
+
+    with Image.open(path, formats=("PNG", "JPEG")) as image:
+        turn = image.getexif().get(_ORIENTATION, 1)
+    return turn if turn in range(1, 9) else 1
+
+
 def read_picture(source: Path | BinaryIO) -> Picture:
     """Read a PNG or a JPEG: RGB, upright as the camera says; of several frames the first.
 

@@ -36,6 +36,9 @@ _TOO_SMALL, _TOO_LARGE, _ALIKE = 0.85, 1.2, 1.15
 """How much smaller or larger than they are two objects look where all numbers are of another scale;
 up to which ratio that is one scale for both. Ours: answers in whole thousandths are within 5 % of
 the true box where nothing hides it."""
+_LOOSE = 1.3
+"""Up to what factor a box's side fits an object (ours): models draw boxes 20 to 30 % too large or
+small."""
 
 
 class VisionLanguageModel(Perception):
@@ -162,17 +165,20 @@ class VisionLanguageModel(Perception):
         return self._calibration.in_picture((picture.shape[1], picture.shape[0]))
 
     def _of_one_scale(self, reached: Sighting, goal: Sighting, picture: Picture) -> Sighting:
-        """The goal's object, without its place where both objects' boxes are of another scale.
+        """The goal's object, without its place where both objects' boxes are read wrongly.
 
-        Then both look smaller or larger than they are, or both as flat as the picture is.
+        Then both fit with x and y swapped only, both look smaller or larger than they are, or both
+        as flat as the picture is.
         """
         if reached.box is None or goal.box is None:
             return goal
         calibration, (tall, wide) = self._in(picture), picture.shape[:2]
-        found = [(reached, self.scene.reached), (goal, self.scene.goal)]
-        small, large, flat = np.array(
-            [_against(s.box, calibration, wanted.size) for s, wanted in found if s.box]
-        ).T
+        found = [(reached.box, self.scene.reached.size), (goal.box, self.scene.goal.size)]
+        read = [_misfit(box, calibration, size) for box, size in found]
+        swapped = [_misfit(self._swapped(box, wide / tall), calibration, s) for box, s in found]
+        if max(read) > _LOOSE >= max(swapped) and (np.array(swapped) < read).all():
+            return replace(goal, place=None, problem=f"both boxes fit {self._other_order()}")
+        small, large, flat = np.array([_against(box, calibration, size) for box, size in found]).T
         if small.max() < _TOO_SMALL and _alike(*small):
             seen = f"{small[0]:.2f} and {small[1]:.2f} times as large as they are"
         elif large.min() > _TOO_LARGE and _alike(*large):
@@ -184,11 +190,30 @@ class VisionLanguageModel(Perception):
             seen = "as flat as the picture"
         else:
             return goal
+        unsized = "is the picture as large as that in which the camera was calibrated, "
         return replace(
             goal,
             place=None,
-            problem=f"both objects look {seen}: is the model family set right, does the server "
-            "shrink pictures (then set max_image_side), are the sizes right?",
+            problem=f"both objects look {seen}: {unsized if calibration.picture is None else ''}"
+            "is the model family set right, does the server shrink pictures (then set "
+            "max_image_side), are the sizes right?",
+        )
+
+    def _swapped(self, box: Box, wide: float) -> Box:
+        """The box of the same numbers with x and y swapped, in a picture so many times as wide."""
+        left, top, right, bottom = box
+        per = wide if FORMATS[self.config.family].scale == "thousandths" else 1.0
+        return top * per, left / per, bottom * per, right / per
+
+    def _other_order(self) -> str:
+        """What boxes say that fit with x and y swapped, and the families that are read so."""
+        family = FORMATS[self.config.family]
+        first, other = ("y", "x") if family.y_first else ("x", "y")
+        alike = replace(family, y_first=not family.y_first, prompt="")
+        named = [name for name, form in FORMATS.items() if replace(form, prompt="") == alike]
+        return (
+            f"only with x and y swapped: '{self.config.family}' is read {first} first, but the "
+            f"model answers {other} first; set family to {' or '.join(named)}"
         )
 
     def find(self, wanted: SeenObject, picture: Picture) -> Sighting:
@@ -246,12 +271,15 @@ class VisionLanguageModel(Perception):
             box = vlm_formats.read_box(answer.text, FORMATS[self.config.family], (width, height))
             per_x, per_y = picture.shape[1] / width, picture.shape[0] / height
             left, top, right, bottom = np.multiply(box, (per_x, per_y, per_x, per_y)).tolist()
-            corners = self._in(picture).to_table([[left, top], [right, top], [left, bottom]])
+            here = self._in(picture)
+            corners = here.to_table([[left, top], [right, top], [left, bottom]])
             side = np.linalg.norm(corners[1:] - corners[0], axis=1).max()
             if not wanted.size / 2 <= side <= 2 * wanted.size:
-                raise UnreadableAnswerError(
-                    f"a box of {100 * side:.1f} cm for an object of {100 * wanted.size:.1f} cm"
-                )
+                says = f"a box of {100 * side:.1f} cm for an object of {100 * wanted.size:.1f} cm"
+                swapped = self._swapped((left, top, right, bottom), width / height)
+                if _misfit(swapped, here, wanted.size) <= _LOOSE:
+                    says += f", which fits {self._other_order()}"
+                raise UnreadableAnswerError(says)
         except UnreadableAnswerError as error:
             absent = isinstance(error, vlm_formats.NotInPictureError)
             return replace(answer, problem=str(error), absent=absent)
@@ -279,6 +307,14 @@ def _against(box: Box, calibration: TableCalibration, size: float) -> tuple[floa
     disc, ball = calibration.seen(np.array([(left + right) / 2, (top + bottom) / 2]), size)
     shape, shapes = sides[0] / sides[1], sorted((1.0, disc[0] / disc[1]))
     return (sides / disc).max(), (sides / ball).min(), shape / np.clip(shape, *shapes)
+
+
+def _misfit(box: Box, calibration: TableCalibration, size: float) -> float:
+    """How many times a side is above a ball's of this size [m] there, or below a flat disc's."""
+    left, top, right, bottom = box
+    sides = np.array([right - left, bottom - top])
+    disc, ball = calibration.seen(np.array([(left + right) / 2, (top + bottom) / 2]), size)
+    return max((sides / ball).max(), (disc / sides).max())
 
 
 def _alike(one: float, other: float) -> bool:

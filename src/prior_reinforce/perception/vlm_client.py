@@ -6,6 +6,7 @@ import base64
 import io
 import os
 import ssl
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol
@@ -88,7 +89,7 @@ class VisionLanguageModelConfig(Checked):
             )
 
     @classmethod
-    def load(cls, path: Path, *, needed: bool = True) -> Self:
+    def load(cls, path: str | os.PathLike[str], *, needed: bool = True) -> Self:
         """Read the section [vlm] of a TOML file: these settings by their names.
 
         Args:
@@ -100,7 +101,7 @@ class VisionLanguageModelConfig(Checked):
             ConfigurationError: An unknown setting, or a value of a wrong type or out of range.
         """
         try:
-            sections = tomllib.loads(path.read_text(encoding="utf-8"))
+            sections = tomllib.loads(Path(path).read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             raise FileFormatError(
                 f"cannot read {path} ({error}); expected a TOML file with a section [vlm]"
@@ -233,7 +234,7 @@ class OpenAIClient:
         if self._sent[0] is not picture:  # the same picture is asked about several times
             self._sent = (picture, _png_address(picture))
         prompt = FORMATS[self.config.family].prompt.format(words=words)
-        content: list[Any] = [
+        asked: list[Any] = [
             {"type": "image_url", "image_url": {"url": self._sent[1]}},
             {"type": "text", "text": prompt},
         ]
@@ -242,16 +243,18 @@ class OpenAIClient:
             "max_tokens": self.config.max_tokens,
             **_extra_body(self.config),
         }
+        content = b""
         try:
             response = self._client.chat.completions.with_raw_response.create(
                 model=self.config.model,
-                messages=[{"role": "user", "content": content}],
+                messages=[{"role": "user", "content": asked}],
                 extra_body={k: v for k, v in more.items() if k not in self.config.leave_out},
             )
-            choice = msgspec.json.decode(response.content, type=_Completion).choices[0]
+            content = response.content
+            choice = msgspec.json.decode(content, type=_Completion).choices[0]
         # Whatever a server sends, the client's parsing included, is no reason to break off.
         except Exception as error:
-            raise EndpointError(self._what_failed(error)) from None
+            raise EndpointError(self._what_failed(error, content)) from None
         message, reason = choice.message, choice.finish_reason
         thinking = message.reasoning_content or message.reasoning
         return Answer(
@@ -276,13 +279,16 @@ class OpenAIClient:
                 shown, begin = f"{shown}{text[begin:at]}***" if at >= begin else shown, at + n
         return shown + text[begin:]
 
-    def _what_failed(self, error: Exception) -> str:
-        """One line with the server's own words and the remedy, whatever way a request fails."""
+    def _what_failed(self, error: Exception, content: bytes) -> str:
+        """One line with the server's own words and the remedy, whatever way a request fails.
+
+        The content is that of an answer with HTTP 200, which is no completion.
+        """
         import openai
 
         config = self.config
         url, tries = without_secrets(config.base_url), f"after {config.max_retries + 1} tries"
-        said = self._words_of(error)
+        said, refused = self._words_of(error, content)
         if isinstance(error, openai.APITimeoutError):
             return f"no answer from {url} in {config.timeout:g} s {tries}; raise timeout"
         for each in (error, error.__cause__):  # which of them depends on the client's version
@@ -295,6 +301,8 @@ class OpenAIClient:
             elif self._proxied and _proxies():
                 remedy += f" {' or '.join(_proxies())} sets a proxy"
             return f"cannot reach {url} {tries} ({said}); {remedy}"
+        if refused and content:
+            return f"{url} refuses with HTTP 200: {said}; see to the account, or the server's log"
         if not isinstance(error, openai.APIStatusError):
             return (
                 f"{url} answers, but not with a chat completion ({said}); the address of an "
@@ -309,21 +317,26 @@ class OpenAIClient:
         elif error.status_code == 404:
             what = f"does not serve model '{config.model}' (HTTP 404)"
             remedy = "set base_url and model"
-        elif refused := [field for field in _FIELDS if field in said]:
-            remedy = f"where a field is not supported, set leave_out = {refused}"
+        elif fields := [field for field in _FIELDS if field in said]:
+            remedy = f"where a field is not supported, set leave_out = {fields}"
         return f"{url} {what}: {said}; {remedy}"
 
-    def _words_of(self, error: Exception) -> str:
-        """What the server, or the network, says of a failure."""
+    def _words_of(self, error: Exception, content: bytes) -> tuple[str, bool]:
+        """What the server, or the network, says of a failure; whether the server names an error."""
         body, response = getattr(error, "body", None), getattr(error, "response", None)
-        words: object = error.__cause__ or error
+        words: object = content.decode(errors="replace") or error.__cause__ or error
+        with suppress(ValueError, RecursionError):
+            body = msgspec.json.decode(content) if content else body
+        named = body.get("error") or body if isinstance(body, dict) else body
+        if isinstance(named, dict):
+            named = named.get("message") or named.get("detail")
         if isinstance(body, dict):
-            words = body.get("message") or body.get("detail") or words
+            words = named or words
         elif response is not None:
             words = response.text or words
         # The key is hidden before anything is cut: the rest of it would be no longer found.
         said = " ".join(self._hidden(str(words) or type(words).__name__).split())
-        return said[:_MOST_SHOWN]
+        return said[:_MOST_SHOWN], isinstance(body, dict) and bool(named)
 
 
 def _proxies() -> list[str]:

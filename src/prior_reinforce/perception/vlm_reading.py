@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -125,11 +126,11 @@ class PictureReading:
             _write(pen, words, at, colour, image.size, above=above)
         return np.asarray(image)
 
-    def save(self, folder: Path, stem: str) -> None:
+    def save(self, folder: str | os.PathLike[str], stem: str) -> None:
         """Write `stem`.png (the picture with boxes) and `stem`.json (every answer) to a folder."""
         from PIL import Image
 
-        drawn = io.BytesIO()
+        folder, drawn = Path(folder), io.BytesIO()
         Image.fromarray(self.drawn()).save(drawn, format="PNG")
         write(folder / f"{stem}.png", drawn.getvalue())
         record = json.dumps(self._record(), indent=2, ensure_ascii=False)

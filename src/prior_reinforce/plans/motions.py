@@ -46,7 +46,7 @@ from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.signals import Signals, analyse
 from prior_reinforce.plans.symmetry import EXTRAPOLATED, Symmetry
-from prior_reinforce.units import looks_like
+from prior_reinforce.units import UNITS, looks_like
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -414,10 +414,10 @@ class Demonstrations:
         """What looks like a slip: other units, and an outcome that comes twice."""
         metres = np.array([unit == "m" for unit in self.outcome_format.units])
         farthest = np.abs(self.outcomes_seen[:, metres]).max(initial=0.0)
-        if looks_like("m", farthest, stated=unit_stated):
+        if looks := looks_like("m", farthest, stated=unit_stated):
             yield (
-                f"an outcome of {farthest:g} m looks like centimetres; outcomes are in metres: "
-                "divide by 100"
+                f"an outcome of {farthest:g} m looks like {UNITS[looks].plural}; outcomes are in "
+                f"metres: divide by {1 / UNITS[looks].factor:g}"
             )
         radians = np.array([unit == "rad" for unit in self.format.units])
         largest = np.abs(self.plans[:, :, radians]).max(initial=0.0)

@@ -25,7 +25,7 @@ def pixel(place):
     return [u / w, v / w]
 
 
-def jpeg(ball=None, tags=()):
+def jpeg(ball=None, tags=(), family=cv2.aruco.DICT_APRILTAG_36h11):
     """The table as JPEG, with an orange ball at a place, and tag k with its centre at tags[k]."""
     table = np.full((_TABLE_PX, int(1.2 * _TABLE_PX), 3), 225, np.uint8)
     at = lambda x, y: (round((0.6 - y) * _TABLE_PX), round((1.4 - x) * _TABLE_PX))  # noqa: E731
@@ -33,7 +33,7 @@ def jpeg(ball=None, tags=()):
         cv2.line(table, at(0.4, step), at(1.4, step), (190,) * 3, 2)
     for step in np.arange(0.4, 1.41, 0.1):
         cv2.line(table, at(step, -0.6), at(step, 0.6), (190,) * 3, 2)
-    dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
+    dictionary = cv2.aruco.getPredefinedDictionary(family)
     for number, place in enumerate(tags):
         tag = cv2.aruco.generateImageMarker(dictionary, number, 60)
         u, v = at(*place)

@@ -3,6 +3,7 @@ import re
 from importlib import resources
 from types import SimpleNamespace
 
+import cv2
 import numpy as np
 import pytest
 from PIL import Image
@@ -109,6 +110,14 @@ def test_the_sheet_that_is_printed_has_these_tags_with_their_centres_where_they_
     tags = pictures.tags()
     assert [*sorted(tags)] == [1, 2, 3, 4, 5, 6]
     np.testing.assert_allclose([tags[number] for number in sorted(tags)], centres, atol=2)
+
+
+@pytest.mark.parametrize("family", ["5X5", "4X4", "APRILTAG_25h9"])
+def test_tags_of_another_family_are_named(pictures, family):
+    name = next(name for name in dir(cv2.aruco) if name.startswith(f"DICT_{family}"))
+    pictures.keep(jpeg(tags=KNOWN, family=getattr(cv2.aruco, name)))
+    with pytest.raises(PerceptionFailedError, match=f"(?i)6 of DICT_{family}.*'Tags to print'"):
+        pictures.tags()
 
 
 def test_no_tag_is_no_error(pictures):

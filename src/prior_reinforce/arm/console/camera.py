@@ -9,6 +9,7 @@ be printed (`tags.svg`, 40 mm wide) are OpenCV's AprilTags of the family 36h11.
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -26,6 +27,10 @@ from prior_reinforce.perception.pictures import read_picture
 from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
+_FAMILY = "DICT_APRILTAG_36h11"
+"""Tags that are printed, by OpenCV's name."""
+_LEAST_TAGS = 4
+"""So many tags of another family are no chance pattern, and could calibrate (ours)."""
 LARGEST_PICTURE = 12_000_000
 """Bytes; ours: a photograph of a telephone."""
 
@@ -131,16 +136,23 @@ class Pictures:
         import cv2
 
         grey = cv2.cvtColor(read_picture(self.file()), cv2.COLOR_RGB2GRAY)
-        family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_APRILTAG_36h11)
-        corners, numbers, _ = cv2.aruco.ArucoDetector(family).detectMarkers(grey)
-        if numbers is None:
+        numbers, corners = _tags_in(grey, _FAMILY)
+        if not len(numbers):
+            families = (name for name in dir(cv2.aruco) if name.startswith("DICT_"))
+            seen = {name: len(_tags_in(grey, name)[0]) for name in families}
+            other = max(seen, key=seen.__getitem__)
+            if seen[other] >= _LEAST_TAGS:
+                raise PerceptionFailedError(
+                    f"no tag of {_FAMILY} is seen, but {seen[other]} of {other}; print and lay out "
+                    "those behind 'Tags to print'"
+                )
             return {}
-        often = np.bincount(numbers.ravel())
+        often = np.bincount(numbers)
         if often.max() > 1:
             raise PerceptionFailedError(
                 f"tag {often.argmax() + 1} is seen {often.max()} times; cover all but one"
             )
-        found = zip(numbers.ravel(), corners, strict=True)
+        found = zip(numbers, corners, strict=True)
         return {int(number) + 1: _crossing(four.reshape(4, 2)) for number, four in found}
 
     def find(self, body: Look) -> Found:
@@ -190,6 +202,15 @@ def _size(path: Path) -> tuple[int, int]:
 
     with Image.open(path) as image:  # which `keep` wrote, upright
         return image.size
+
+
+def _tags_in(grey: np.ndarray, family: str) -> tuple[np.ndarray, Sequence[np.ndarray]]:
+    """Numbers and corners of the tags of one of OpenCV's families."""
+    import cv2
+
+    tags = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, family))
+    corners, numbers, _ = cv2.aruco.ArucoDetector(tags).detectMarkers(grey)
+    return np.empty(0, int) if numbers is None else numbers.ravel(), corners
 
 
 def _crossing(corners: np.ndarray) -> list[float]:
