@@ -163,5 +163,5 @@ def looks_like(unit: str, number: float, *, error: bool = False, stated: bool = 
         return known.spoken if known.error_limit <= abs(number) < math.inf else ""
     if abs(number) <= known.largest * (STATED if stated else 1.0):
         return ""
-    finer = known.small in UNITS and UNITS[known.spoken].largest < abs(number) < math.inf
+    finer = known.kind == "length" and UNITS[known.spoken].largest < abs(number) < math.inf
     return known.small if finer else known.spoken
