@@ -142,3 +142,12 @@ def test_a_channel_that_goes_further_is_taken(unit, ends, later):
     names, units = ("j1", "gap"), ("rad", unit)
     before = demonstrations(names, units, lambda i: gap(i, *ends))
     assert joined(before, selection(names, units, lambda i: gap(i, *later)))[0].n == 2 * N
+
+
+def test_a_base_that_was_turned_and_stands_still_is_in_no_other_unit():
+    def thrown(i, pan):
+        return np.column_stack([np.full(len(S), pan), 0.2 + (0.5 + 0.05 * i) * S])
+
+    names = ("pan", "elbow")
+    before = demonstrations(names, "rad", lambda i: thrown(i, 0.02))
+    assert joined(before, selection(names, "rad", lambda i: thrown(i, 1.2)))[0].n == 2 * N

@@ -1,4 +1,4 @@
-"""Names, units, lengths and further motion are told by what they hold, whatever they are called."""
+"""What moves beside the motion is told by what it does, whatever it is called."""
 
 import numpy as np
 import pytest
@@ -6,15 +6,12 @@ import pytest
 from prior_reinforce.arm.recordings import read_recordings
 from prior_reinforce.arm.recordings.beside import (
     columns_beside,
-    frames_said,
     is_clock,
     moves_beside,
-    names_said,
-    units_said,
-    with_rate,
+    twin_vectors,
 )
 from prior_reinforce.arm.recordings.naming import words
-from prior_reinforce.errors import FileFormatError, UnclearUnitsError
+from prior_reinforce.errors import UnclearUnitsError
 from tests.arm.recordings.recorded import sampled
 
 T = np.arange(101) / 50
@@ -22,75 +19,6 @@ S = np.clip((T - 0.3) / 1.2, 0, 1)
 S = 10 * S**3 - 15 * S**4 + 6 * S**5
 Q = np.array([0.1, -0.6, 0.2]) + S[:, None] * [0.3, 0.4, -0.2]
 UR = ("pan", "lift", "elbow")
-
-
-@pytest.mark.parametrize(
-    ("texts", "joints", "found"),
-    [
-        ({"dof_names": ("elbow", "pan", "lift")}, UR, ("elbow", "pan", "lift")),
-        ({"order": ("elbow", "pan", "lift")}, UR, ("elbow", "pan", "lift")),
-        ({"order": ("elbow", "pan", "lift")}, None, ()),
-        ({"labels": ("a", "b", "c")}, None, ("a", "b", "c")),
-        ({"labels": ("a", "b", "c"), "order": ("lift", "pan", "x")}, UR, ("lift", "pan", "x")),
-        ({"joint_names": UR, "names": UR}, None, UR),
-        ({"camera_names": ("a", "b", "c"), "kinds": ("q", "q", "q")}, None, ()),
-        ({"joint_units": ("deg", "m", "rad")}, None, ()),
-        ({"joint_names": ("a", "b")}, None, ()),
-    ],
-)
-def test_texts_that_are_as_many_as_the_columns_are_their_names(texts, joints, found):
-    assert names_said("a.npz", texts, 3, joints) == found
-
-
-def test_texts_that_contradict_each_other_are_refused():
-    texts = {"joint_names": UR, "dof_names": UR[::-1]}
-    with pytest.raises(FileFormatError, match="joint_names says pan, lift, elbow; dof_names says"):
-        names_said("a.npz", texts, 3, UR)
-
-
-@pytest.mark.parametrize(
-    ("stated", "given", "rate"),
-    [
-        ({"meta.fps": 50}, None, {"fps": 50}),
-        ({"meta.frame_rate": 50}, None, {"frame_rate": 50}),
-        ({"meta.timing.dt_ms": 20.0}, None, {"dt_ms": 20.0}),
-        ({"meta.fps": 50, "rate": np.array(50.0)}, None, {"rate": 50.0}),
-        ({"meta.fps": 50, "meta.camera.fps": 30}, None, {"fps": 50}),
-        ({"meta.fps": 50, "meta.robot.hz": 100}, 50.0, {"fps": 50}),
-        ({"meta.version": 2}, None, {}),
-    ],
-)
-def test_a_rate_deep_in_what_a_file_says_is_its_rate(stated, given, rate):
-    assert {k: v for k, v in with_rate("a.npz", stated, given).items() if "." not in k} == rate
-
-
-def test_two_rates_that_contradict_each_other_are_refused():
-    stated = {"meta.fps": 50, "meta.robot.dt": 0.01}
-    with pytest.raises(
-        FileFormatError, match=r"meta\.fps says 50 .*, but meta\.robot\.dt 100; .*-r"
-    ):
-        with_rate("a.npz", stated)
-    with pytest.raises(FileFormatError, match=r"rate says 20 .*, but meta\.fps 50"):
-        with_rate("a.npz", {"rate": np.array(20), "meta.fps": 50})
-
-
-@pytest.mark.parametrize(
-    ("texts", "units"),
-    [
-        ({"units": ("deg", "deg", "mm")}, ("deg", "deg", "mm")),
-        ({"q_unit": ("°",)}, ("deg", "deg", None)),
-        ({"time_unit": ("ms",)}, (None,) * 3),
-        ({"meta.units": ("deg",)}, ("deg", "deg", None)),
-        ({"meta.outcome_units": ("m",), "meta.object.unit": ("m",)}, (None,) * 3),
-        ({"units": ("deg", "deg", "counts")}, ("deg", "deg", None)),
-    ],
-)
-def test_units_in_words_are_of_the_columns(texts, units):
-    assert units_said(texts, ("pan", "lift", "gripper")) == units
-
-
-def test_an_angles_unit_in_words_is_not_of_places():
-    assert units_said({"unit": ("deg",)}, ("x", "y", "pan")) == (None, None, "deg")
 
 
 @pytest.mark.parametrize(
@@ -106,30 +34,6 @@ def test_an_angles_unit_in_words_is_not_of_places():
 def test_a_list_of_texts_in_any_form(said):
     assert words(said) == UR
     assert words(np.arange(3)) == ()
-
-
-@pytest.mark.parametrize(
-    ("stated", "kept"),
-    [
-        ({"lengths": np.int64(80)}, 80),
-        ({"is_pad": np.arange(101) >= 80}, 80),
-        ({"mask": (np.arange(101) < 80).astype(float)}, 80),
-        ({"length": np.int64(101)}, 101),
-        ({"length": 0.8}, 101),
-        ({"episode_length": np.int64(500)}, 101),
-        ({"mask": np.arange(101) % 20 < 10}, 101),
-        ({"contact": np.arange(101) >= 80}, 101),
-    ],
-)
-def test_a_number_of_frames_or_a_mask_says_what_is_padding(stated, kept):
-    q = np.where(np.arange(101)[:, None] < 80, Q, 0.0)
-    found, said = frames_said("a", "q", {"q": q, **stated}, 101)
-    assert (found, len(said)) == (kept, int(kept < 101))
-
-
-def test_frames_beyond_the_number_that_move_are_no_padding():
-    with pytest.raises(FileFormatError, match="declares 40 samples by length but q holds 101"):
-        frames_said("a", "q", {"q": Q, "length": np.int64(40)}, 101)
 
 
 LATE = Q[np.maximum(np.arange(101) - 4, 0)]
@@ -244,3 +148,32 @@ def test_a_command_beside_what_was_measured_is_asked_about(tmp_path):
     assert asked.value.options == "--key q_act"
     (read,) = read_recordings(tmp_path / "a.csv", key=("q_act",))
     np.testing.assert_allclose(read.positions, late)
+
+
+@pytest.mark.parametrize(
+    ("names", "option"),
+    [
+        (("q", "action"), "--key q"),
+        (("cmd", "q"), "--key q"),
+        (("q_ref", "q"), "--key q"),
+        (("leader", "follower"), "--key follower"),
+        (("one", "other"), "--key WHICH"),
+        (("target_q", "actual_q"), "--key actual_q"),
+    ],
+)
+def test_what_was_measured_is_told_by_words_of_commands_and_measurements(names, option):
+    both = np.hstack([Q, np.vstack([Q[:1], Q[:1], Q[:-2]])])
+    columns = [f"{name}_{i}" for name in names for i in range(3)]
+    (asked,) = twin_vectors([*columns, "width"], np.column_stack([both, S]))
+    assert asked.option == f"{option} --key width"
+    assert not asked.guessed
+
+
+def test_a_base_that_moves_is_named_though_it_is_called_a_pose():
+    others = {
+        "base_pose": np.column_stack([0.3 * S, S, S]),
+        "base_T": np.tile(np.eye(4), (len(S), 1, 1)) + S[:, None, None],
+        "tcp_pose": np.column_stack([0.3 * S, S, S]),
+        "base_velocity": np.gradient(S),
+    }
+    assert {*moves_beside(Q, others, T)} == {"base_pose", "base_T"}

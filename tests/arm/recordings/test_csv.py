@@ -21,6 +21,7 @@ from tests.arm.recordings.recorded import (
     check_motions,
     sampled,
     write_csv,
+    write_npz,
     write_outcomes,
 )
 
@@ -242,13 +243,13 @@ def test_joints_by_the_gates_names_and_a_refusal_that_is_short(tmp_path):
     )
 
 
-def test_other_endings_are_read_where_the_format_is_said(tmp_path):
+def test_other_endings_are_read_where_nothing_else_is_there(tmp_path):
     write_csv(tmp_path)
     for path in list(tmp_path.glob("*.csv")):
         path.rename(path.with_suffix(".txt"))
-    with pytest.raises(FileFormatError, match="no format that can be read"):
-        read_recordings(tmp_path)
-    assert len(read_recordings(tmp_path, format="csv")) == N
+    assert len(read_recordings(tmp_path)) == len(read_recordings(tmp_path, format="csv")) == N
+    write_npz(tmp_path)
+    assert {r.episode for r in read_recordings(tmp_path)} == {f"throw_{i}" for i in range(N)}
 
 
 def texts(path, names, cells, q, heads):
@@ -338,3 +339,41 @@ def test_a_head_that_comes_again_parts_throws_and_is_no_row(tmp_path):
     read = read_recordings(tmp_path / "log.csv")
     assert [r.episode for r in read] == ["log-0", "log-1", "log-2"]
     np.testing.assert_allclose(read[1].positions, sampled(1, 50)[1])
+
+
+def test_rows_without_an_episode_are_of_none(tmp_path):
+    t, q = sampled(0, 50)
+    lines = [",".join(("t", "episode", *JOINTS))]
+    for k, name in enumerate(("0", "", "1")):
+        lines += [
+            f"{a + 10 * k},{name}," + ",".join(map(repr, r))
+            for a, r in zip(t, q.tolist(), strict=True)
+        ]
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    assert [r.episode for r in read_recordings(tmp_path / "log.csv")] == ["0", "1"]
+
+
+def test_exponents_of_fortran_are_read(tmp_path):
+    (tmp_path / "a.csv").write_text("t,j1\n0.0D+00,1.5D-01\n1.0D-02,-2.5d+00\n2.0D-02,1D1\n")
+    (read,) = read_recordings(tmp_path / "a.csv")
+    np.testing.assert_allclose(read.positions[:, 0], [0.15, -2.5, 10])
+
+
+def test_a_date_beside_a_time_in_seconds_is_no_clock(tmp_path):
+    t, q = sampled(0, 50)
+    rows = [f"2024-03-09,{a}," + ",".join(map(repr, r)) for a, r in zip(t, q.tolist(), strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join([",".join(("date", "t", *JOINTS)), *rows]))
+    (read,) = read_recordings(tmp_path / "a.csv")
+    np.testing.assert_allclose(read.times, t)
+
+
+def test_a_rate_with_a_decimal_comma_in_a_comment_is_not_cut(tmp_path):
+    _, q = sampled(0, 50)
+    rows = [",".join(map(repr, r)) for r in q.tolist()]
+    for said in ("# fps: 29,97", "# sample rate: 1,000 Hz"):
+        (tmp_path / "a.csv").write_text("\n".join([said, ",".join(JOINTS), *rows]))
+        with pytest.raises(FileFormatError, match="neither times nor a rate"):
+            read_recordings(tmp_path / "a.csv")
+    (tmp_path / "a.csv").write_text("\n".join(["# fps: 40, joints: 7", ",".join(JOINTS), *rows]))
+    (read,) = read_recordings(tmp_path / "a.csv")
+    assert read.period == pytest.approx(1 / 40)

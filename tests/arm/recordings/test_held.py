@@ -43,6 +43,23 @@ def test_a_lift_that_stands_where_it_is_held_says_nothing(tmp_path, lift, called
     assert imported(written(tmp_path, lift, called, form)).n == N
 
 
+@pytest.mark.parametrize("form", ["csv", "npz"])
+def test_a_lift_that_is_held_at_zero_does_not_stand_elsewhere(tmp_path, form):
+    folder = written(tmp_path, (0.3, 0.3), form=form)
+    with pytest.raises(InvalidDemonstrationsError, match=r"at 0.3 in 0 to 5, .* at 0: "):
+        imported(folder, replace(ROBOT, held={"lift": 0.0}))
+
+
+def test_a_lift_in_an_array_of_its_own_is_compared_too(tmp_path):
+    folder = written(tmp_path, (0.35, 0.35), form="npz")
+    for path in folder.glob("*.npz"):
+        with np.load(path) as own:
+            t, q = own["t"], own["positions"]
+        np.savez(path, t=t, q=q[:, :-1], joint_names=np.array(NAMES), lift=q[:, -1])
+    with pytest.raises(InvalidDemonstrationsError, match=r"at 0.35 in 0 to 5, "):
+        imported(folder)
+
+
 def test_its_unit_is_read(tmp_path):
     assert imported(written(tmp_path, (200.0, 200.0), "lift [mm]")).n == N
 

@@ -75,3 +75,12 @@ def test_an_angle_that_is_stated_in_degrees_is_not_doubted_with_others():
     found = select(takes(("j1", "j2"), (40, 53), units=[("deg", None)]))
     assert (found.recorded_units, found.remarks) == (("deg", "deg"), ())
     assert [one.option for one in found.ambiguities] == ["--units deg"]
+
+
+@pytest.mark.parametrize(
+    ("end", "option"), [((0.4, -1.6, 33), "rad rad UNIT"), ((30, 4, 90), "deg")]
+)
+def test_one_joint_of_a_robot_that_counts_turns_is_not_all_in_degrees(end, option):
+    names = ("pan", "lift", "spin")
+    found = select(takes(names, end, end), names, names, plan_units=("rad",) * 3)
+    assert [one.option for one in found.ambiguities] == [f"--units {option}"]

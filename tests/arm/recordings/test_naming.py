@@ -133,6 +133,9 @@ def test_numbers_are_found_and_what_cannot_be_parsed_is_none():
         (("left_finger", "right_finger", "joint1"), None),
         (("gripper", "gripper_width", "joint1"), [2, 0]),
         (("gripper_effort", "joint1"), None),
+        (("gripper_yaw", "joint1"), None),
+        (("is_gripped", "gripper_id", "joint1"), None),
+        (("gripper_width", "gripper_is_grasped", "joint1"), [2, 0]),
     ],
 )
 def test_the_only_opening_of_a_gripper_is_the_gripper(there, found):

@@ -241,3 +241,19 @@ def test_three_numbers_of_a_place_are_called_by_their_key(tmp_path):
     np.savez(tmp_path / "a.npz", t=t, eef_pos=place, quat=quaternion)
     (read,) = read_recordings(tmp_path / "a.npz", key=("eef_pos", "quat"))
     assert read.names[:4] == ("eef_pos_x", "eef_pos_y", "eef_pos_z", "quat_0")
+
+
+@pytest.mark.parametrize(
+    ("keys", "names"),
+    [
+        (("tcp",), "tcp_x tcp_y tcp_z"),
+        (("positions", "gripper"), "joint1 joint2 joint3 gripper"),
+        (("hand_joints", "gripper"), "joint1 joint2 joint3 gripper"),
+    ],
+)
+def test_three_numbers_that_may_be_joints_are_no_place(tmp_path, keys, names):
+    t, q = sampled(0, 50)
+    arrays = {keys[0]: q[:, :3]} | ({"gripper": q[:, 3]} if len(keys) > 1 else {})
+    np.savez(tmp_path / "a.npz", t=t, **arrays)
+    (read,) = read_recordings(tmp_path / "a.npz", key=keys)
+    assert read.names == tuple(names.split())

@@ -343,3 +343,27 @@ def test_a_distance_and_a_bearing_are_said_to_be_no_x_and_y(recording, tmp_path)
     path = table(tmp_path, "episode,r,angle\n0,0.9,7\n")
     with pytest.raises(InvalidDemonstrationsError, match="x = r cos b"):
         import_demonstrations(recording, outcomes=path, outcome_names=("x", "y"))
+
+
+def test_left_and_right_at_once_are_refused(recording, tmp_path):
+    path = table(tmp_path, "episode,ahead,left,right\n0,0.9,0,0.12\n")
+    with pytest.raises(InvalidDemonstrationsError, match="left and right for y"):
+        import_demonstrations(recording, outcomes=path, outcome_names=("x", "y"))
+
+
+def test_columns_in_capitals_are_the_components(recording, tmp_path):
+    path = table(tmp_path, "\n".join(["Episode,X,Y", *rows_of_outcomes()]))
+    result = import_demonstrations(recording, outcomes=path, outcome_names=("x", "y"))
+    np.testing.assert_allclose(result.demonstrations.outcomes_seen, list(OUTCOMES.values()))
+
+
+def test_a_letter_that_says_a_side_is_no_typo(recording, tmp_path):
+    path = table(tmp_path, "\n".join(["episode,x,y", *rows_of_outcomes()[:-1], "5,1.05,0.05 L"]))
+    with pytest.raises(FileFormatError, match="left is positive, right negative"):
+        import_demonstrations(recording, outcomes=path)
+
+
+def test_asking_for_some_episodes_does_not_hide_another_numbering(recording, tmp_path):
+    path = table(tmp_path, "\n".join(["episode,x,y", *rows_of_outcomes(first=1)]))
+    with pytest.raises(InvalidDemonstrationsError, match="renumber"):
+        import_demonstrations(recording, outcomes=path, episodes=["1", "2", "3"])

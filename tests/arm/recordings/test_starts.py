@@ -56,3 +56,11 @@ def test_ways_back_are_named_and_motions_that_return_by_themselves_are_none():
     assert ways_back(recordings(*(take(i) for i in range(6)))) == ""
     closed = [np.vstack([take(i)[::2], take(i)[::-2]]) for i in range(6)]
     assert ways_back(recordings(*closed)) == ""
+
+
+def test_what_stands_still_may_stand_anywhere():
+    still = [np.column_stack([np.full(40, 1.5 * (-1) ** i), 10 + 75 * S]) for i in range(6)]
+    assert said(still) == []
+    noise = np.random.default_rng(0).normal(0, 1e-4, (6, 40))
+    near = [np.column_stack([1.5 + 0.01 * (i % 2) + n, 10 + 75 * S]) for i, n in enumerate(noise)]
+    assert said(near) == []

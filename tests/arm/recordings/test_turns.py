@@ -7,6 +7,7 @@ from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.selection import select
 from prior_reinforce.arm.recordings.turns import aligned
 from prior_reinforce.arm.robots import RobotLimits
+from prior_reinforce.errors import InvalidDemonstrationsError
 
 T = np.arange(100) / 100
 S = 10 * T**3 - 15 * T**4 + 6 * T**5
@@ -135,3 +136,16 @@ def test_an_angle_without_unit_is_continued(name):
     read = [np.where([0, 0, 1], np.mod(q + np.pi, 2 * np.pi) - np.pi, q) for q in true]
     positions, _ = brought_together(("j1", "j2", name), None, read)
     np.testing.assert_allclose(positions, true, atol=1e-9)
+
+
+def test_a_quaternion_in_counts_is_refused_by_its_length():
+    half = 0.3 + 0.2 * T
+    counts = 16384 * np.column_stack([np.cos(half), np.sin(half), 0 * T, 0 * T])
+    with pytest.raises(InvalidDemonstrationsError, match="have length 16384, and a quaternion"):
+        brought_together(("qw", "qx", "qy", "qz"), None, [counts])
+
+
+def test_a_wrist_that_counts_a_turn_a_throw_is_brought_to_one_turn():
+    spins = [(0.1 + 0.5 * T + 2 * np.pi * k)[:, None] for k in (0, 1, 1, 1, 1, 5)]
+    read, said = brought_together(("joint1",), "rad", spins)
+    assert np.ptp([motion[0, 0] for motion in read]) < 1e-9, said

@@ -23,6 +23,8 @@ demonstrations of one task start alike, and end about as far."""
 _LEAST: Mapping[str, float] = {"rad": 1.0, "m": 0.5}
 """Of numbers in a smaller unit than they are said to be in, the largest: a channel that moves by
 less than a degree or a millimetre is hardly used. Ours."""
+_STANDS = 0.02
+"""Part of its largest number by which a channel moves at least that tells its unit. Ours."""
 _STARTS = 0.2
 """Part of that which suffices where the start is as many times off as the end. Ours."""
 
@@ -85,6 +87,11 @@ def appended(
     return replace(more, plans=plans, **both)
 
 
+def _stands(ours: np.ndarray, theirs: np.ndarray, largest: float) -> bool:
+    """Whether a channel stands still, somewhere in each: it says nothing of its unit."""
+    return bool(max(np.ptp(ours), np.ptp(theirs)) < _STANDS * largest)
+
+
 def _out_of_scale(
     before: Demonstrations, motions: Sequence[Float[np.ndarray, "T D"]]
 ) -> Iterator[str]:
@@ -96,7 +103,7 @@ def _out_of_scale(
             for each in (before.plans, motions)
         )
         largest, least = np.abs([ours, theirs]).max(), np.abs([ours, theirs]).max(axis=1).min()
-        if unit == "1" or least == 0:
+        if unit == "1" or least == 0 or _stands(ours, theirs, largest):
             continue
         for factor in _FACTORS.get(unit, _ANY_FACTORS):
             for larger, smaller in ((theirs, ours), (ours, theirs)):

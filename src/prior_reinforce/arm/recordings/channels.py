@@ -72,7 +72,7 @@ _BY_WORD = (
 _COORDINATE = re.compile(r"(?P<group>|.*[^a-z0-9])(?P<part>[xyz])([ _-]?ax[ei]s)?", re.IGNORECASE)
 _OF_PLACE = re.compile(
     r"|(.*[^a-z])?(p|pos|positions?|place|trans(lation)?|cart(esian)?|tcp|tool|tip|ee|eef|pose|xyz"
-    r"|(end_?)?effector|flange|hand|location|ax[ei]s)[^a-z]*",
+    r"|(end_?)?effector|flange|hand|location|ax[ei]s|base)[^a-z]*",
     re.IGNORECASE,
 )
 """What x, y and z are the place of: `tool_x`. Others may be joints: `hip_x`, `hip_y`."""

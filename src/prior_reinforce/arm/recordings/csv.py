@@ -14,12 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import (
-    columns_beside,
-    headed,
-    names_said,
-    twin_vectors,
-)
+from prior_reinforce.arm.recordings.beside import columns_beside, twin_vectors
 from prior_reinforce.arm.recordings.clock import (
     NO_COLUMN,
 )
@@ -35,6 +30,7 @@ from prior_reinforce.arm.recordings.recording import (
     unread,
     without_units,
 )
+from prior_reinforce.arm.recordings.stated import headed, names_said
 from prior_reinforce.arm.recordings.table_times import (
     FEWEST_COUNTS,
     called_times,
@@ -53,8 +49,8 @@ from prior_reinforce.arm.recordings.units import (
 from prior_reinforce.errors import FileFormatError
 
 SUFFIXES = (".csv", ".tsv")
-_WHEN_SAID = (*SUFFIXES, ".txt", ".dat", ".log")
-"""Read where the format is said, because much else has such names."""
+IN_TEXT = (".txt", ".dat", ".log")
+"""Read where nothing else is there, because much else has such names."""
 _MOST_WORDS = 8
 """Texts between which a column switches. Ours."""
 
@@ -81,7 +77,7 @@ LOG_FORMATS = (
 
 def read(source: Path, options: ReadOptions) -> Episodes:
     """Read a CSV file, or every CSV file of a folder."""
-    paths = files_at(source, SUFFIXES) or files_at(source, _WHEN_SAID)
+    paths = files_at(source, SUFFIXES) or files_at(source, (*SUFFIXES, *IN_TEXT))
     for path in paths:
         if len(paths) > 1 and path.stem in (options.leave_out or ()):
             yield path.stem, unread
@@ -95,7 +91,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
                 "or more"
             )
         column, names, guessed = _throws(table, path.stem, options, alone=len(paths) == 1)
-        for episode in sorted(set(names), key=natural_order):
+        for episode in sorted({*names} - {""} or {""}, key=natural_order):  # what is blank is none
             own = table.rows([i for i, name in enumerate(names) if name == episode])
             yield episode, partial(_episode, own, episode, options, column, guessed, said)
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import may_move, recorded_among
+from prior_reinforce.arm.recordings.beside import may_move
 from prior_reinforce.arm.recordings.bounds import MOST_COLUMNS, check_numbers
 from prior_reinforce.arm.recordings.clock import Stamps
 from prior_reinforce.arm.recordings.naming import find_channels, said_in
@@ -28,6 +28,7 @@ from prior_reinforce.arm.recordings.recording import (
     named_damage,
     natural_order,
 )
+from prior_reinforce.arm.recordings.stated import recorded_among
 from prior_reinforce.errors import FileFormatError
 
 SUFFIXES = (".h5", ".hdf5")

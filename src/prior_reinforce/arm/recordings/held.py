@@ -14,12 +14,15 @@ from prior_reinforce.units import factor
 _OFF = 0.01
 """By which a held joint may be off, in [m] and [rad]. Ours: a lift's play and its encoder's noise;
 at an arm's length 0.01 rad is as much."""
+_MOST = 7.0
+"""Largest number that may be in [m] or [rad]; more is in another unit. Ours, as `units` has it."""
 
 
 def check_held(recordings: Sequence[Recording], robot: RobotLimits | None) -> None:
     """Check that joints that the robot holds still stand in the recordings where it says.
 
-    Columns without a unit may be in any: a lift that is held at 0.35 m may be recorded as 350.
+    Columns without a unit are in m and rad, or where they are too large for these in another: a
+    lift that is held at 0.35 m may be recorded as 350.
 
     Raises:
         InvalidDemonstrationsError: One stands elsewhere, or moves: the arm's reach and its box
@@ -28,10 +31,10 @@ def check_held(recordings: Sequence[Recording], robot: RobotLimits | None) -> No
     for joint, at in robot.held.items() if robot is not None else ():
         elsewhere: dict[tuple[float, float], list[str]] = {}
         for recording in recordings:
-            columns = [*recording.beside]
-            for i in find_channels([joint], columns) or ():
-                span, unit = recording.beside[columns[i]], split_unit(columns[i], CHANNEL_UNITS)[1]
-                units = [unit] if unit else CHANNEL_UNITS
+            for column in [one for one in recording.beside if find_channels([joint], [one])]:
+                span, unit = recording.beside[column], split_unit(column, CHANNEL_UNITS)[1]
+                units = ["m", "rad"] if max(map(abs, span)) <= _MOST else CHANNEL_UNITS
+                units = [unit] if unit else units
                 scales = [scale for u in units for b in ("m", "rad") if (scale := factor(u, b))]
                 if not any(all(abs(s * end - at) <= _OFF for end in span) for s in scales or [1.0]):
                     low, high = (float(f"{end:.3g}") for end in span)

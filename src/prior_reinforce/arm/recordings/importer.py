@@ -318,8 +318,8 @@ class Recordings:
         """
         motions = [recording.episode for recording in self.episodes]
         if not self.options.rests or not {*motions}.isdisjoint(found.episodes):
-            if self.options.episodes is None:  # else the table may be of other sources, too
-                check_rows(found, motions, self.there)
+            # Where some are asked for, the table may be of other sources, too.
+            check_rows(found, motions, self.there, others=self.options.episodes is not None)
             return found
         if len(motions) == len(found.episodes):
             numbers = [digits_at_end(name) for name in found.episodes]
@@ -426,13 +426,17 @@ def detect_format(source: Path) -> str:
     """Return the one of `FORMATS` that a file or a folder looks like, or raise FileFormatError."""
     found = [name for name, format in FORMATS.items() if format.recognises(source)]
     found = [name for name in found if FORMATS[name].whole] or found
+    if not found and has_files(source, csv.IN_TEXT):
+        return "csv"
     if len(found) != 1:
         for folder in sorted(source.iterdir()) if source.is_dir() and not found else ():
             within = [name for name in FORMATS if FORMATS[name].recognises(folder)]
             if folder.is_dir() and within:
+                several = sum(path.is_dir() for path in source.iterdir()) > 1
+                join = ", or put the files of all into one folder, named as theirs" * several
                 raise FileFormatError(
                     f"{source} itself holds no recordings; name {folder}, which looks like "
-                    f"{' or '.join(within)}"
+                    f"{' or '.join(within)}{join}"
                 )
         raise FileFormatError(
             f"{source} looks like {' and '.join(found) or 'no format that can be read'}; say its "

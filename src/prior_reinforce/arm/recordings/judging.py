@@ -28,6 +28,8 @@ Given = Literal["", "one for all", "each"]
 """How --units gives the recorded units; empty where it does not."""
 _MOST_PERCENT = 110.0
 """Percent of a range; ours: calibrations overshoot by a few."""
+_HARDLY_DEG = 2.0
+"""Degrees within which a recorded arm hardly moves. Ours."""
 _NOT_DONE, _HARDLY = "which no arm does", "which is hardly a motion"
 _NORMALISED = (
     ", unless LeRobot recorded shares of each joint's range (-100 to 100, where use_degrees is "
@@ -132,12 +134,20 @@ class Judge:
         far = [one for one in self.angles if self._looks(one) not in (one.unit, None)]
         near = max((one.largest for one in self.angles if one not in far), default=0.0)
         together = self.fixed or self.given or 2 * len(far) > len(self.angles)
+        if self._counts_turns(far):
+            return far
         if far and (together or near > TURN["rad"]):
             return self.angles
         groups = vectors([one.name for one in self.beliefs]).values()
         numbered = [{self.beliefs[i] for i in group} for group in groups]
         alike = {one for group in numbered if not group.isdisjoint(far) for one in group}
         return [one for one in self.angles if one in far or one in alike]
+
+    def _counts_turns(self, far: Sequence[Belief]) -> bool:
+        """Whether one joint of the robot is beyond a turn, and in degrees others hardly move."""
+        others = [one.largest for one in self.angles if one not in far]
+        one_of_many = self.fixed and not self.given and len(far) == 1 and len(others) > 1
+        return one_of_many and 0 < max(others) < _HARDLY_DEG
 
     def _looks(self, one: Belief) -> str | None:
         """The unit that a channel's numbers look like."""
@@ -161,7 +171,7 @@ class Judge:
     def _is_no_angle(self, one: Belief) -> Doubt | None:
         """What turns too far is none: a gripper, or a name without meaning beside joints."""
         beside = one in self.far and len(self.far) < len(self.angles)
-        unnamed = beside and one.kind not in (Kind.ANGLE, Kind.ROTATION)
+        unnamed = beside and not self.fixed and one.kind not in (Kind.ANGLE, Kind.ROTATION)
         none = one.kind is Kind.TOOL or unnamed
         if one.stated or one.unit not in TURN or not none or self._looks(one) == one.unit:
             return None
@@ -179,6 +189,8 @@ class Judge:
         looks, why = self._looks(one), _NOT_DONE
         if looks == one.unit:
             return Doubt("deg", why) if one in self.far and looks != "deg" else None
+        if one in self.far and self._counts_turns(self.far):
+            return Doubt(UNIT, "which is rad if it counts turns, deg if the others are still")
         if one.unit == "percent":
             why = _HARDLY if looks else "which no share of a range does"
             if self.given and self.silent and one.stated and one.largest > _MOST_PERCENT:

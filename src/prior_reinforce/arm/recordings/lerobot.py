@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Shaped
 
-from prior_reinforce.arm.recordings.beside import may_move, recorded_among
+from prior_reinforce.arm.recordings.beside import may_move
 from prior_reinforce.arm.recordings.bounds import check_bytes, check_numbers
 from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.clock import (
@@ -39,6 +39,7 @@ from prior_reinforce.arm.recordings.recording import (
     Recording,
     named_damage,
 )
+from prior_reinforce.arm.recordings.stated import recorded_among
 from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.errors import FileFormatError

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import Arrays, recorded_among
+from prior_reinforce.arm.recordings.beside import Arrays
 from prior_reinforce.arm.recordings.bounds import MOST_BYTES, check_bytes
 from prior_reinforce.arm.recordings.naming import find_channels, said_in
 from prior_reinforce.arm.recordings.options import ReadOptions
@@ -27,6 +27,7 @@ from prior_reinforce.arm.recordings.recording import (
     named_damage,
     unread,
 )
+from prior_reinforce.arm.recordings.stated import recorded_among
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import open_npz
 

@@ -42,6 +42,8 @@ _HUNDREDS = re.compile(r"[+-]?[1-9]\d\d+")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}([.,]\d{3})+")
 _WITH_UNIT = re.compile(r"([-+\d.,]+) *([^\d\s.,]+)")
 """A number and its unit in one cell."""
+_SIDED = re.compile(r"(?i)(?<![a-z])(l|r|left|right|links|rechts)(?![a-z])")
+"""Words of a side beside a number: `10 L`."""
 _DATED = re.compile(
     r"(19|20)\d\d([-_.]?)[01]\d\2[0-3]\d([T_ .-]?[0-2]\d[-_.:h]?[0-5]\d([-_.:m]?[0-5]\d.*)?)?$"
 )
@@ -90,13 +92,18 @@ class Outcomes:
         axes = axes_of(OutcomeFormat(tuple(names), ("m",) * len(names)))
         for name, axis in zip(names, axes, strict=True):
             words = PLACE_WORDS[axis] if axis < len(PLACE_WORDS) else ()
-            found = [(own, sign) for own, sign in zip((name, *words), (1, 1, -1), strict=False)
-                     if own in self.names]  # fmt: skip
+            found = [(own, sign) for said_as, sign in zip((name, *words), (1, 1, -1), strict=False)
+                     for own in self.names if own.lower() == said_as.lower()]  # fmt: skip
             if not found:
                 missing.append(name)
                 continue
             own, sign = found[0]
-            said += [f"{own} is {'-' * (sign < 0)}{name}"] * (own != name)
+            if len(found) > 1:
+                raise InvalidDemonstrationsError(
+                    f"{self.where} has {' and '.join(one for one, _ in found)} for {name}: write "
+                    f"one column {name}"
+                )
+            said += [f"{own} is {'-' * (sign < 0)}{name}"] * (own.lower() != name.lower())
             at, signs = [*at, self.names.index(own)], [*signs, float(sign)]
         if missing:
             polar = ""
@@ -257,6 +264,8 @@ def _finite(path: Path, table: Table, row: int, column: int) -> float:
         remedy = "measure that outcome, or empty the whole row's numbers"
         if re.search(r"\d", cell):
             remedy = "write a plain number there"
+            if _SIDED.search(cell):
+                remedy += ", with the sign that the letter says: left is positive, right negative"
         if (said := _WITH_UNIT.fullmatch(cell)) and (unit := known_unit(said[2])):
             remedy = f"write {said[1]}, and the unit in the head: {name} [{unit}]"
         raise FileFormatError(
@@ -272,8 +281,12 @@ def missing_outcomes(episodes: Sequence[str], outcomes: Outcomes) -> list[str]:
     return [episode for episode in episodes if episode not in picked]
 
 
-def check_rows(outcomes: Outcomes, chosen: Sequence[str], there: Sequence[str]) -> None:
+def check_rows(
+    outcomes: Outcomes, chosen: Sequence[str], there: Sequence[str], *, others: bool = False
+) -> None:
     """Check that every row is of one of the `chosen` episodes, or of another that is `there`.
+
+    With `others`, rows of none are no mistake unless the table looks numbered from another number.
 
     Raises:
         InvalidDemonstrationsError: A row is of none; so is the last if the rows are numbered from 1
@@ -282,7 +295,7 @@ def check_rows(outcomes: Outcomes, chosen: Sequence[str], there: Sequence[str]) 
     rows, picked = outcomes.episodes, _matched(chosen, outcomes.episodes).values()
     known = {*there, *picked} | {digits_at_end(name) for name in there} - {""}
     unknown = [name for name in rows if name not in known and digits_at_end(name) not in known]
-    if unknown:
+    if unknown and (not others or _renumber(there, rows)):
         raise InvalidDemonstrationsError(
             f"{outcomes.where} names episodes {listed(unknown)} that were not found (there are "
             f"{listed(there)}); {_renumber(there, rows)}correct the names, or take out the rows of "

@@ -14,6 +14,7 @@ from prior_reinforce.arm.recordings.judging import UNIT, Given, Judge, beliefs_o
 from prior_reinforce.arm.recordings.naming import (
     find_channels,
     joint_vectors,
+    measured_of,
     missing_channels,
     numbered_like,
 )
@@ -176,7 +177,8 @@ def _columns(recording: Recording, joints: tuple[str, ...], names: tuple[str, ..
     if recording.named:
         missing = say_names(missing_channels(joints, recording.names))
         fitting = list(joint_vectors(recording.names, len(joints)))
-        by_key = f", or numbered columns at once: --key {fitting[0]}" if fitting else ""
+        stem = measured_of(fitting) or next(iter(fitting), "")
+        by_key = f", or numbered columns at once: --key {stem}" * bool(stem)
         of_kind = kinds(recording.names)
         others = [kind for kind in of_kind if not kind.is_pose]
         if Kind.PLACE in of_kind and len(others) < len(joints) and not fitting:

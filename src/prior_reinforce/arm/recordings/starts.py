@@ -19,6 +19,8 @@ _APART, _AGAINST = 2.0, 0.5
 """Ranges of its motion by which a channel's starts in two groups of takes may lie apart, and that
 where the groups move in opposite directions. Ours: a zero that was moved, columns in another order,
 a gripper that counts the other way."""
+_LEAST = {"rad": 0.1, "m": 0.02, "percent": 5.0}
+"""Range of a channel that moves, by its unit. Ours: what stands still may stand anywhere."""
 _WITHIN = 0.2
 """Part of the gap between two groups by which starts within one may differ. Ours."""
 _BACK = 0.1
@@ -51,7 +53,8 @@ def odd_starts(
         spread = max(np.ptp(starts[group, i]) for group in (below, above))
         against = np.median(ways[below, i]) * np.median(ways[above, i]) < 0
         allowed = (_AGAINST if against else _APART) * ranges[i]
-        if ranges[i] > 0 and gaps[cut - 1] > allowed and spread <= _WITHIN * gaps[cut - 1]:
+        moves = ranges[i] > _LEAST.get(unit, 0.0)
+        if moves and gaps[cut - 1] > allowed and spread <= _WITHIN * gaps[cut - 1]:
             few, rest = sorted((below, above), key=lambda group: (len(group), max(group)))
             if {*rest.tolist()} != {*range(n)} and {*few.tolist()} == {*range(n)}:
                 few, rest = rest, few

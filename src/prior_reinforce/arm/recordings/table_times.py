@@ -48,7 +48,7 @@ FEWEST_COUNTS = 20
 _MOST_COMMENTS = 200
 """Lines above a table that are looked through. Ours."""
 _SAYS = re.compile(
-    r"([A-Za-z][A-Za-z_ ]*?)\s*[:=]\s*(\d+\.?\d*(?:[eE][-+]?\d+)?)(?![\d.:-])\s*([A-Za-zµ]*)"
+    r"([A-Za-z][A-Za-z_ ]*?)\s*[:=]\s*(\d+\.?\d*(?:[eE][-+]?\d+)?)(?![\d.:-]|,\d)\s*([A-Za-zµ]*)"
 )
 """`fps: 40`, `sample rate = 1 kHz`."""
 _SECONDS = re.compile(r"(?P<stem>.*?)(secs?|seconds|s)")
@@ -104,7 +104,8 @@ def called_times(table: Table, options: ReadOptions) -> list[int]:
         none = options.time_column == NO_COLUMN
         return [] if none else [named_column(table, options.time_column, "--time-column")]
     bare = (split_unit(name, SECONDS)[0].lower() for name in table.names if table.named)
-    return [i for i, name in enumerate(bare) if name in _TIMES]
+    found = [i for i, name in enumerate(bare) if name in _TIMES]
+    return [i for i in found if len({*table.cells[i]}) > 1] or found  # a date alone stands still
 
 
 def named_column(table: Table, name: str, option: str) -> int:

@@ -46,6 +46,8 @@ _THOUSANDS = re.compile(
 )
 """Numbers whose thousands are apart by a mark that no decimal sign is: `1'012.5`, `1 012,5`. Whole
 numbers with blanks between are a list."""
+_FORTRAN = re.compile(r"^([+-]?[\d.]+)[dD]([+-]?\d+)$")
+"""`1.2D-01`."""
 _MOMENT = re.compile(
     r"(\d{4})-?(\d\d)-?(\d\d)(?:[T ](\d\d):?(\d\d)(?::?(\d\d)(?:[.,](\d{1,9})\d*)?)?)?"
     r" ?(?:Z|UTC|([+-]\d\d):?(\d\d)?)?"
@@ -227,6 +229,7 @@ def _number(text: str, decimal: str = ".") -> float:
         return float(text if decimal == "." else text.replace(decimal, "."))
     except ValueError:
         plain = text.replace("\u2212", "-")  # a minus as spreadsheets and people print it
+        plain = _FORTRAN.sub(r"\1e\2", plain)
         if _THOUSANDS.fullmatch(plain):
             plain = re.sub(r"[ '’\u00a0\u202f]", "", plain)
         return _number(plain, decimal) if plain != text else math.nan

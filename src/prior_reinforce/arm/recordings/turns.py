@@ -50,7 +50,7 @@ _STILL = 0.03
 _NOISE = 0.02
 """The same of a channel that may be no angle: a magnet's current that is switched off steps by
 about a turn too. Ours: an encoder's noise."""
-_MOST_TURNS = 3
+_MOST_TURNS = 12
 """By which an episode is shifted at most. Ours."""
 _Form = Callable[[np.ndarray], np.ndarray]
 """From attitudes (..., 3) or (..., 4) to other numbers of the same."""
@@ -82,6 +82,8 @@ def aligned(
     kept = []
     for group in form.attitudes:
         own = [motion[:, [form.names.index(name) for name in group]] for motion in motions]
+        if len(group) == 4:
+            _check_length(group, own)
         if group not in told and (len(group) == 3 or _off_length_1(own) < _NORM):
             kept.append(group)
     form = replace(form, attitudes=tuple(kept))
@@ -191,6 +193,17 @@ def _consecutive(
             taken |= {*group}
             found.append(group)
     return found
+
+
+def _check_length(group: Sequence[str], motions: Sequence[np.ndarray]) -> None:
+    """Refuse four numbers called like a quaternion whose length is one number, and not 1."""
+    lengths = np.concatenate([np.linalg.norm(motion, axis=1) for motion in motions])
+    length = float(np.median(lengths))
+    if abs(length - 1) > _NORM and np.ptp(lengths) < _NORM * length:
+        raise InvalidDemonstrationsError(
+            f"{', '.join(group)} have length {length:.6g}, and a quaternion's is 1: divide them by "
+            "it where they are recorded"
+        )
 
 
 def _off_length_1(motions: Sequence[np.ndarray]) -> float:

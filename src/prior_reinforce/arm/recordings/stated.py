@@ -1,0 +1,293 @@
+"""What a file says of the motion that it holds: its names and units, its rate, its length.
+
+Recorders call these things as they like. So they are told by what they hold: names are texts, as
+many as the columns.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from prior_reinforce.arm.recordings.beside import MASK, Arrays, moves_beside
+from prior_reinforce.arm.recordings.bounds import check_names
+from prior_reinforce.arm.recordings.channels import Kind, kinds, one_for_all
+from prior_reinforce.arm.recordings.clock import (
+    NO_COLUMN,
+    SAME_RATE,
+    Clock,
+    clock_among,
+    declared_rate,
+    rises,
+    says_time,
+)
+from prior_reinforce.arm.recordings.naming import (
+    Texts,
+    missing_channels,
+    said_in,
+)
+from prior_reinforce.arm.recordings.recording import (
+    Positions,
+    Recording,
+    recorded,
+    without_units,
+)
+from prior_reinforce.arm.recordings.tables import Table
+from prior_reinforce.arm.recordings.units import (
+    CHANNEL_UNITS,
+    Ambiguity,
+    known_unit,
+    say_names,
+)
+from prior_reinforce.arm.robots.limits import says_no_position
+from prior_reinforce.errors import FileFormatError
+
+if TYPE_CHECKING:
+    from prior_reinforce.arm.recordings.options import ReadOptions
+
+_NAMES = re.compile(r"name|joint|dof|motor|actuator|channel|column|label|ax[ei]s", re.IGNORECASE)
+_OTHER_NAMES = re.compile(r"link|body|bodies|camera|task|object|site|sensor|frame", re.IGNORECASE)
+_FRAMES = re.compile(
+    r"lengths?|(n|num)_?(frames|steps|samples)|(episode|traj|trajectory|sequence)_(len|lengths?)"
+)
+_UNIT = re.compile(r"((joint|angle|angular|position|motion|rotation)s?_?)?units?", re.IGNORECASE)
+"""What the joints' units are called among others, deep in what a file says of itself."""
+_MOST_SAID = 1_000_000
+"""Bytes of a JSON beside a table at most. Ours: it says what the columns are."""
+
+
+def recorded_among(
+    where: Path,
+    episode: str,
+    keys: Sequence[str],
+    arrays: Arrays,
+    options: ReadOptions,
+    *,
+    texts: Texts,
+    stated: Mapping[str, Any] | None = None,
+    names: Sequence[str] = (),
+    clock: Clock | None = None,
+    **more: Any,
+) -> Recording:
+    """Return the recording whose motion is the arrays `keys`, (T,) or (T, D), side by side.
+
+    `arrays` are all that may say something of it, `texts` what the file says in words, and `stated`
+    further numbers, of which one may count frames, or be the rate. `names` are those of the columns
+    if they are known.
+    """
+    count = len(arrays[keys[0]])
+    stated = stated or {}
+    stated = stated if options.time_column else with_rate(where, stated, options.rate)
+    kept, why = frames_said(f"{where}: {episode}", keys[0], {**stated, **arrays}, count)
+    arrays = {n: a[:kept] if a.shape[:1] == (count,) else a for n, a in arrays.items()}
+    positions, known = joined(where, keys, arrays, texts, options.joints)
+    bare, units = without_units(names or known)
+    said = units_said(texts, bare or ("",) * positions.shape[1])
+    units = tuple(a or b for a, b in zip(said, units or (None,) * len(said), strict=False))
+    if clock is None:
+        declared = None if options.time_column == NO_COLUMN else stated
+        clock = clock_among(where, episode, kept, arrays, options, declared)
+    others = {name: array for name, array in arrays.items() if name not in keys}
+    called = (*keys, *(names or known))
+    more = {"left_out": moves_beside(positions, others, clock.times, called)} | more
+    more["beside"] = {
+        name: (float(np.nanmin(own)), float(np.nanmax(own)))
+        for name, own in others.items()
+        if own.ndim == 1 and own.dtype.kind in "biuf" and np.any(np.isfinite(own))
+    }
+    more["remarks"] = (*more.get("remarks", ()), *why)
+    if not bare:
+        unclear = _other_names(episode, texts, positions.shape[1], options.joints or ())
+        more["ambiguities"] = (*clock.ambiguities, *unclear)
+    return recorded(episode, clock, positions, bare, units=units, **more)
+
+
+def _other_names(
+    episode: str, texts: Texts, count: int, joints: Sequence[str]
+) -> Iterator[Ambiguity]:
+    """Ask about texts that hold wanted joints and are not as many as the columns."""
+    for key, own in texts.items():
+        missing = missing_channels(joints, own)
+        if len(missing) < len(joints) and tuple(joints)[: len(own)] != own:
+            order = shlex.join((*own, *missing)) if len(own) + len(missing) == count else "NAME ..."
+            what = f"{episode} has {count} columns, and {key} names {say_names(own)}"
+            what += ": it looks as if these were the first, in that order"
+            yield Ambiguity(what, f"--joints {order}")
+            return
+
+
+def joined(
+    where: Path,
+    keys: Sequence[str],
+    arrays: Arrays,
+    texts: Texts,
+    joints: Sequence[str] | None = None,
+) -> tuple[Positions, tuple[str, ...]]:
+    """Put arrays (T,) and (T, D) of the same frames side by side, with the names of the columns.
+
+    Names are of all columns, or of the first array's; without any, several keys name the columns.
+    """
+    columns = [arrays[key] if arrays[key].ndim > 1 else arrays[key][:, None] for key in keys]
+    if len({len(column) for column in columns}) > 1:
+        each = ", ".join(f"{key} has {len(arrays[key])}" for key in keys)
+        raise FileFormatError(
+            f"the arrays have different frames: {each}; take one of them, or write the others at "
+            f"the times of {keys[0]}: numpy.interp(its times, their own times, their values)"
+        )
+    widths = [column.shape[1] for column in columns]
+    said = list(names_said(where, texts, sum(widths), joints))
+    place = _coordinates(keys[0], widths)
+    if len(keys) == 1 and not said:
+        said = place
+    if len(keys) > 1 and not said:
+        said = list(names_said(where, texts, widths[0], joints)) if widths[0] > 1 else [keys[0]]
+        said = said or place or [f"joint{i + 1}" for i in range(widths[0])]
+        for key, width in zip(keys[1:], widths[1:], strict=True):
+            said += [key if width == 1 else f"{key}_{i}" for i in range(width)]
+    return np.concatenate(columns, axis=1).astype(np.float64), tuple(said)
+
+
+def _coordinates(key: str, widths: Sequence[int]) -> list[str]:
+    """Names of the three numbers of a place, `tcp_x`; none where they may be joints.
+
+    What is only called positions is a place beside the four numbers of an attitude.
+    """
+    names = [f"{key}_{axis}" for axis in "xyz"]
+    bare = key.rpartition("/")[2].lower() in ("p", "pos", "position", "positions")
+    is_place = widths[0] == 3 and {*kinds(names)} == {Kind.PLACE} and (4 in widths or not bare)
+    return names if is_place else []
+
+
+def names_said(
+    where: object, texts: Texts, count: int, joints: Sequence[str] | None = None
+) -> tuple[str, ...]:
+    """Return the names that a file's texts give to so many columns; none if none fit.
+
+    Texts that hold a wanted joint are names, whatever they are called; others if they are called
+    so. FileFormatError where two contradict each other.
+    """
+    wanted = tuple(joints or ())
+    fit = {
+        key: own
+        for key, own in texts.items()
+        if len(own) == len(set(own)) == count and all(own) and not says_no_position(key)
+        if not all(known_unit(word) for word in own)
+    }
+    sure = {k: own for k, own in fit.items() if len(missing_channels(wanted, own)) < len(wanted)}
+    called = {k: own for k, own in fit.items() if _NAMES.search(k) and not _OTHER_NAMES.search(k)}
+    found = {own: key for key, own in (sure or called).items()}
+    if len(found) > 1:
+        each = "; ".join(f"{key} says {say_names(own)}" for own, key in found.items())
+        raise FileFormatError(
+            f"{where} names the columns in two ways: {each}; keep the right one in the file"
+        )
+    return next(iter(found), ())
+
+
+def units_said(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
+    """Return the unit of each column as a file's texts state it; none if they state no unit.
+
+    A single one holds for all that can be in it.
+    """
+    for key, own in texts.items():
+        if "unit" not in key.lower() or says_time(key) or len(own) not in (1, len(names)):
+            continue
+        if "." in key and (_OTHER_NAMES.search(key) or not _UNIT.fullmatch(key.split(".")[-1])):
+            continue
+        units = [unit if unit in CHANNEL_UNITS else None for unit in map(known_unit, own)]
+        if len(own) == 1 and units[0] is not None:
+            units = one_for_all(units[0], names)
+        if any(units):
+            return tuple(units)
+    return (None,) * len(names)
+
+
+def with_rate(
+    where: object, stated: Mapping[str, Any], given: float | None = None
+) -> dict[str, Any]:
+    """Return a file's numbers, and by its bare name the rate among those deep in it: `meta.fps`.
+
+    FileFormatError where it states two, and none is given.
+    """
+    split = {name: name.rpartition(".") for name in stated}
+    places = {n: bare for n, (at, _, bare) in split.items() if not _OTHER_NAMES.search(at)}
+    rates = {
+        name: declared_rate(where, {bare: stated[name]})["own_rate"]
+        for name, bare in places.items()
+        if ("." in name or np.size(stated[name]) == 1)
+        and declared_rate(where, {bare: stated[name]})
+    }
+    deep = [name for name in rates if "." in name]
+    for name, rate in rates.items():
+        first, of_first = next(iter(rates.items()))
+        if deep and given is None and abs(rate - of_first) > SAME_RATE * of_first:
+            raise FileFormatError(
+                f"{where}: {first} says {of_first:.4g} frames a second, but {name} {rate:.4g}; "
+                "take one: --rate"
+            )
+    own = {places[name]: stated[name] for name in deep[:1] if len(rates) == len(deep)}
+    return {**stated, **own}
+
+
+def headed(table: Table, joints: Sequence[str] | None = None) -> Table:
+    """Return a table without heads under those that a JSON beside it gives to its columns.
+
+    It is called as the table, or is the only one of the folder. Names of all columns but the first
+    are taken if that one rises, as times do.
+    """
+    path = Path(table.where)
+    found = [path.with_suffix(".json")]
+    if not table.named and not found[0].is_file():
+        found = [p for p in path.parent.glob("*.json") if not p.with_suffix(path.suffix).exists()]
+    if table.named or len(found) != 1 or found[0].stat().st_size > _MOST_SAID:
+        return table
+    texts = said_in({"": found[0].read_bytes()})[0]
+    names = names_said(found[0], texts, len(table.names), joints)
+    if not names and len(table) and rises(table.stamps(0)):
+        names = names_said(found[0], texts, len(table.names) - 1, joints)
+        names = ("t", *names) if names else ()
+    if not names:
+        return table
+    check_names(found[0], names)
+    texts = {f".{key}": own for key, own in texts.items()}
+    units = units_said(texts, names)
+    if not any(units):  # of the columns but the time's
+        units = (None, *units_said(texts, names[1:]))
+    units = tuple(None if says_time(n) else u for n, u in zip(names, units, strict=True))
+    return replace(table, names=names, units=units, named=True)
+
+
+def frames_said(
+    where: str, key: str, stated: Mapping[str, Any], count: int
+) -> tuple[int, tuple[str, ...]]:
+    """Return how many of the frames were recorded, the rest being padding, and a remark on it.
+
+    A number of frames says so, or a mask that is one thing for the first frames and another for the
+    rest. FileFormatError where frames beyond that number move.
+    """
+    found, kept = "", count
+    for name, value in stated.items():
+        own, numbers = name.rpartition("/")[2].lower(), np.asarray(value)
+        n = count
+        if MASK.fullmatch(own) and numbers.shape == (count,) and numbers.dtype.kind in "biuf":
+            real = numbers.astype(bool) == bool(numbers[0])
+            n = int(np.argmin(np.append(real, False)))
+            n = count if np.any(real[n:]) else n
+        elif _FRAMES.fullmatch(own) and numbers.size == 1 and numbers.dtype.kind in "iu":
+            n = int(numbers.reshape(()))
+            rest = np.nan_to_num(np.asarray(stated[key], dtype=float)[n:])
+            if 0 < n < count and np.any(np.diff(rest, axis=0)):
+                raise FileFormatError(
+                    f"{where} declares {n} samples by {name} but {key} holds {count}; copy the "
+                    "file again, or leave that episode out"
+                )
+        if 1 < n < kept:
+            found, kept = name, n
+    remark = f"{count - kept} frames at the end left out, which are padding by {found}"
+    return kept, (remark,) * (kept < count)
