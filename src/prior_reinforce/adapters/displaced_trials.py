@@ -17,13 +17,7 @@ from prior_reinforce.adapters.change_points import Change, History, split, told
 from prior_reinforce.adapters.displacement import BayesianConfig, DisplacementPrior
 from prior_reinforce.adapters.expectation_propagation import Posterior, Readings, infer
 from prior_reinforce.adapters.memory import LATEST, Memory, Places, tried_again, untried_around
-from prior_reinforce.adapters.p_hit import (
-    Belief,
-    Targets,
-    p_hit_after,
-    share_within,
-    trials_to_go,
-)
+from prior_reinforce.adapters.p_hit import Belief, Targets, p_hit_after, share_within, trials_to_go
 from prior_reinforce.arrays import Point, Points
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import Reading

@@ -8,12 +8,7 @@ from typing import Annotated
 import tyro
 
 from prior_reinforce.arm.workspace.state import Standing
-from prior_reinforce.arm.workspace.text import (
-    execution_warning,
-    next_step,
-    say_outdated,
-    say_trial,
-)
+from prior_reinforce.arm.workspace.text import execution_warning, next_step, say_outdated, say_trial
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.commands import warn
 from prior_reinforce.commands.base import OnWorkspace, Words, trial_and_rest

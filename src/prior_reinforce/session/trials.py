@@ -25,15 +25,7 @@ from prior_reinforce.errors import (
 from prior_reinforce.formats import OutcomeFormat, in_tolerances
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.readings import Reading
-from prior_reinforce.session.events import (
-    Amended,
-    Asked,
-    Entry,
-    Event,
-    GoalSet,
-    Told,
-    Voided,
-)
+from prior_reinforce.session.events import Amended, Asked, Entry, Event, GoalSet, Told, Voided
 
 if TYPE_CHECKING:
     from prior_reinforce.adapters import base

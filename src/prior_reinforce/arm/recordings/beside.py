@@ -14,24 +14,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.clock import (
-    COUNTER,
-    Times,
-    says_time,
-    tells_time,
-)
-from prior_reinforce.arm.recordings.naming import (
-    measured_of,
-    vectors,
-)
-from prior_reinforce.arm.recordings.recording import (
-    Positions,
-)
-from prior_reinforce.arm.recordings.units import (
-    SECONDS,
-    Ambiguity,
-    say_names,
-)
+from prior_reinforce.arm.recordings.clock import COUNTER, Times, says_time, tells_time
+from prior_reinforce.arm.recordings.naming import measured_of, vectors
+from prior_reinforce.arm.recordings.recording import Positions
+from prior_reinforce.arm.recordings.units import SECONDS, Ambiguity, say_names
 from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.plans.signals import held_channels
 from prior_reinforce.plans.whole_turns import TURN

@@ -15,9 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from prior_reinforce.arm.recordings.beside import columns_beside, twin_vectors
-from prior_reinforce.arm.recordings.clock import (
-    NO_COLUMN,
-)
+from prior_reinforce.arm.recordings.clock import NO_COLUMN
 from prior_reinforce.arm.recordings.naming import find_channels, numbered_like, vectors, words
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
@@ -42,10 +40,7 @@ from prior_reinforce.arm.recordings.table_times import (
     with_whole_dates,
 )
 from prior_reinforce.arm.recordings.tables import Table, read_table
-from prior_reinforce.arm.recordings.units import (
-    Ambiguity,
-    say_names,
-)
+from prior_reinforce.arm.recordings.units import Ambiguity, say_names
 from prior_reinforce.errors import FileFormatError
 
 SUFFIXES = (".csv", ".tsv")

@@ -215,8 +215,8 @@ class Inspection:
         if np.any(np.abs(plans[:, -1] - plans[:, 0]) > near):
             return ""
         return (
-            "every motion ends where it began: if that is the way back, cut it off at the rest "
-            "before it (--rests 0.3), and leave it out"
+            "every motion ends where it began: if it rests before it goes back, cut it there "
+            "(--rests 0.3), and leave the way back out"
         )
 
     def _noise(self) -> str:

@@ -33,12 +33,7 @@ from prior_reinforce.arm.recordings.clock import (
 )
 from prior_reinforce.arm.recordings.naming import missing_channels
 from prior_reinforce.arm.recordings.options import ReadOptions
-from prior_reinforce.arm.recordings.recording import (
-    Episodes,
-    Positions,
-    Recording,
-    named_damage,
-)
+from prior_reinforce.arm.recordings.recording import Episodes, Positions, Recording, named_damage
 from prior_reinforce.arm.recordings.stated import recorded_among
 from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.arm.robots.limits import says_no_position

@@ -27,24 +27,10 @@ from prior_reinforce.arm.recordings.clock import (
     rises,
     says_time,
 )
-from prior_reinforce.arm.recordings.naming import (
-    Texts,
-    missing_channels,
-    said_in,
-)
-from prior_reinforce.arm.recordings.recording import (
-    Positions,
-    Recording,
-    recorded,
-    without_units,
-)
+from prior_reinforce.arm.recordings.naming import Texts, missing_channels, said_in
+from prior_reinforce.arm.recordings.recording import Positions, Recording, recorded, without_units
 from prior_reinforce.arm.recordings.tables import Table
-from prior_reinforce.arm.recordings.units import (
-    CHANNEL_UNITS,
-    Ambiguity,
-    known_unit,
-    say_names,
-)
+from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, Ambiguity, known_unit, say_names
 from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.errors import FileFormatError
 

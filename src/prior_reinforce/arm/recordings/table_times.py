@@ -40,7 +40,7 @@ from prior_reinforce.errors import ConfigurationError, FileFormatError
 
 _TIMES = (
     "t", "time", "times", "timestamp", "timestamps", "stamp", "elapsed", "elapsed_time", "duration",
-    "datetime", "date",
+    "datetime", "date", "zeit", "uhrzeit", "hora", "heure", "ora",
 )  # fmt: skip
 _DATES = ("date", "datum", "day", "fecha", "data")
 FEWEST_COUNTS = 20

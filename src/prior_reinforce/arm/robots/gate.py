@@ -26,13 +26,7 @@ from prior_reinforce.arm.robots.limits import (
     missing_joints,
     other_quantities,
 )
-from prior_reinforce.arm.robots.report import (
-    LimitLine,
-    LimitReport,
-    Samples,
-    Times,
-    worst_place,
-)
+from prior_reinforce.arm.robots.report import LimitLine, LimitReport, Samples, Times, worst_place
 from prior_reinforce.arrays import Point
 from prior_reinforce.errors import ConfigurationError, InvalidPlanError, OutOfReachError
 from prior_reinforce.plans.interpolation import RATE, join_frames

@@ -79,8 +79,8 @@ class RobotLimits:
     chain: Chain | None = None
     """Kinematics, for the tool tip; None where they are not known, so that no box can be kept."""
     held: Mapping[str, float] = field(default_factory=dict)
-    """Joints that stand still, and where, in [rad] and [m]: a lift below the arm. They are within
-    `chain`."""
+    """Joints that stand still, and where, in [rad] and [m]: a lift below the arm, as `chain` has
+    it."""
 
     def __post_init__(self) -> None:
         """Copy and check.

@@ -101,7 +101,7 @@ def read_urdf(
         acceleration=acceleration,
         jerk=jerk,
         chain=kinematics,
-        held=hold,
+        held={joint.name: hold[joint.name] for joint in chain if joint.name in hold},
     )
 
 

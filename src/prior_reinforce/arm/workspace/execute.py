@@ -15,11 +15,7 @@ from typing import Literal
 
 from msgspec import structs
 
-from prior_reinforce.arm.executing.arguments import (
-    check_command,
-    split_command,
-    without_arguments,
-)
+from prior_reinforce.arm.executing.arguments import check_command, split_command, without_arguments
 from prior_reinforce.arm.executing.base import ArmSettings, Motion
 from prior_reinforce.arm.executing.command import execute_command, read_result, was_executed
 from prior_reinforce.arm.executing.drive import Look, Request, drive_command, read_look
