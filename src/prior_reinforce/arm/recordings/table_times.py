@@ -211,20 +211,14 @@ def clock_of_table(
     """
     if not times.columns:
         declared = _declared(table, above, options)
-        for i, name in enumerate(table.names):  # else it would be said to hold no times
-            if not (table.named and says_time(name)) or declared or options.rate:
-                continue
-            bad = np.isnan(table.values[:, i])
-            if 0 < bad.sum() < len(bad) / 2:
-                row = int(np.argmax(bad))
-                raise FileFormatError(
-                    f"{table.where}, line {table.lines[row]}: {name} is "
-                    f"{table.cells[i][row][:40]!r}, expected a time; take that line out"
-                )
+        if not (declared or options.rate):  # a line of means is no want of times
+            _check_times(table, [i for i, n in enumerate(table.names) if says_time(n)])
         return options.clock(episode, len(table), **declared)
     time = times.columns[0]
     dates, name = table.nanoseconds(time), table.names[time] or f"column {time + 1}"
     unit = times.unit or unit
+    if dates is None:
+        _check_times(table, [time])
     stamps, unit = (dates, "ns") if dates is not None else (table.numbers(time), unit)
     if unit and len(times.columns) == 2:
         whole, part = (table.values[:, i] for i in times.columns)
@@ -240,3 +234,15 @@ def clock_of_table(
     held = {table.names[i]: table.values[:, i] for i in times.held if table.is_number(i)}
     hold_together(table.where, {name: clock.times, **held})
     return clock
+
+
+def _check_times(table: Table, columns: Sequence[int]) -> None:
+    """Refuse a line in which a column of times holds something else: `Mittelwert`."""
+    for i in columns:
+        bad = np.isnan(table.values[:, i])
+        if table.named and 0 < bad.sum() < len(bad) / 2:
+            row = int(np.argmax(bad))
+            raise FileFormatError(
+                f"{table.where}, line {table.lines[row]}: {table.names[i]} is "
+                f"{table.cells[i][row][:40]!r}, expected a time; take that line out"
+            )
