@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.parsing import from_words, read_place
 from prior_reinforce.wording import in_words, say_chance, say_length, say_place, to_words
 
 METRES = OutcomeFormat.metres(2)
@@ -83,3 +84,13 @@ def test_lengths(length, form, said):
 def test_a_chance_is_one_of_three_words():
     said = [say_chance(p) for p in (0.0, 0.0999, 0.1, 0.43, 0.6499, 0.65, 1.0)]
     assert said == ["unlikely"] * 2 + ["possible"] * 3 + ["likely"] * 2
+
+
+@pytest.mark.parametrize("unit", ["%", "degrees", "°", "inch", "turn", "M", "Seconds", "pins"])
+def test_a_unit_in_another_spelling_is_read_as_it_is_printed(unit):
+    form = OutcomeFormat(("a",), (unit,))
+    assert form.units == (unit,)
+    said = say_place([3.0], form).removeprefix("a ")
+    np.testing.assert_allclose(read_place(said, form), [3.0])
+    word = "late" if unit == "Seconds" else "long"
+    np.testing.assert_allclose(from_words(f"{said} {word}", form).error_seen, [3.0])

@@ -81,7 +81,7 @@ def _patterns(units: tuple[str, ...]) -> tuple[re.Pattern[str], ...]:
     )
     word_first = rf"([a-z]+)\s+(?:by\s+)?((?:{_NUMBER})\s*(?:{unit}))"
     place = rf"(?P<number>[+-]?(?:{_NUMBER}))\s*(?P<unit>{unit})(?:\s*[,;]\s*|\s+|$)"
-    return tuple(map(re.compile, (term, word_first, place)))
+    return tuple(re.compile(each, re.IGNORECASE) for each in (term, word_first, place))
 
 
 def with_points(text: str, k: int) -> str:
@@ -124,7 +124,7 @@ def from_words(text: str, form: OutcomeFormat | None = None) -> Reading:
     Raises:
         InvalidFeedbackError: Unknown words, or one direction named twice.
     """
-    form = form or OutcomeFormat.metres(2)
+    form = (form or OutcomeFormat.metres(2)).as_listed()
     parts = _parts(text, form)
     hits = {_HITS[part] for part in parts if part in _HITS}
     if len(hits) > 1:
@@ -292,7 +292,7 @@ def read_place(text: str, form: OutcomeFormat) -> Point:
     """
     if re.search(_PLUS_MINUS, text):
         raise InvalidFeedbackError(f"cannot read {text!r} as one place; leave out the +-")
-    k = form.outcome_dim
+    k, form = form.outcome_dim, form.as_listed()
     expected = f"{k} finite numbers: {', '.join(form.names)}"
     numbers = _numbers_with_units(text.replace("\u2212", "-"), form.units)
     if numbers is None or len(numbers) != k:
