@@ -42,6 +42,7 @@ def in_units(
         InvalidDemonstrationsError: A stated unit is impossible.
     """
     said, where, given = outcomes.units, outcomes.where, given and (known_unit(given) or given)
+    wanted = wanted and [known_unit(unit) or unit for unit in wanted]
     if wanted is None:
         wanted = [base_of(unit or given or "m")[0] for unit in said]
     if len(wanted) != len(said):
@@ -58,19 +59,19 @@ def in_units(
     _refuse_odd_row(outcomes, wanted)
     reach = np.abs(outcomes.values).max(axis=0, initial=0.0, where=~np.isnan(outcomes.values))
     unsaid = {
-        j: known_unit(spelt) or spelt
-        for j, (own, spelt) in enumerate(zip(said, wanted, strict=True))
-        if own is None and given is None and kind_of(known_unit(spelt) or spelt) == "length"
+        j: unit
+        for j, (own, unit) in enumerate(zip(said, wanted, strict=True))
+        if own is None and given is None and kind_of(unit) == "length"
     }
     together = max((reach[j] for j in unsaid), default=0.0)  # lengths of one table have one unit
     scale, unclear = [], dict[str, list[str]]()
-    for j, (name, own, spelt) in enumerate(zip(outcomes.names, said, wanted, strict=True)):
-        unit, largest = known_unit(spelt) or spelt, reach[j]
+    for j, (name, own, unit) in enumerate(zip(outcomes.names, said, wanted, strict=True)):
+        largest = reach[j]
         judged = together if len({*unsaid.values()}) == 1 and j in unsaid else largest
         recorded = own or given or judge_unit(unit, judged) or unit
         if base_of(recorded)[0] != base_of(unit)[0]:
             raise ConfigurationError(
-                f"{name} in {where} is in {recorded}, but its unit is to be {spelt}; correct "
+                f"{name} in {where} is in {recorded}, but its unit is to be {unit}; correct "
                 "either (a workspace has it in workspace.toml, [outcome])"
             )
         scale.append(conversion(recorded, unit, f"{name} in {where}"))
@@ -96,7 +97,7 @@ def in_units(
         )
         for unit, reached in unclear.items()
     )
-    first = known_unit(wanted[0]) or wanted[0] if wanted else ""
+    first = wanted[0] if wanted else ""
     sd_scale = conversion(outcomes.sd_unit, first, SD) if outcomes.sd_unit else [*scale, 1.0][0]
     values, sd = outcomes.values * np.array(scale), outcomes.sd * sd_scale
     converted = replace(outcomes, values=values, sd=sd, units=tuple(wanted), sd_unit=first)
@@ -119,13 +120,12 @@ def _refuse_one_unit(outcomes: Outcomes, wanted: Sequence[str], unclear: Sequenc
     InvalidDemonstrationsError says what to write in the head.
     """
     far = np.nanmax(np.abs(outcomes.values), axis=0, initial=0.0)
-    own = [known_unit(unit) or unit for unit in wanted]
-    looks = [judge_unit(unit, most) or unit for unit, most in zip(own, far, strict=True)]
+    looks = [judge_unit(unit, most) or unit for unit, most in zip(wanted, far, strict=True)]
     unsaid = [j for j, unit in enumerate(outcomes.units) if unit is None]
     several = len({kind_of(unit) for unit in unclear}) > 1
     for unit in unclear:
-        alike = [j for j in unsaid if kind_of(own[j]) == kind_of(unit) == "length"]
-        near = [far[j] * (factor(unit, "m") or 1.0) for j in alike if looks[j] == own[j]]
+        alike = [j for j in unsaid if kind_of(wanted[j]) == kind_of(unit) == "length"]
+        near = [far[j] * (factor(unit, "m") or 1.0) for j in alike if looks[j] == wanted[j]]
         several |= any(0 < most < _NEAR_THE_BASE for most in near)
     if several:
         names = [outcomes.names[j] for j in unsaid]
@@ -145,7 +145,6 @@ def _refuse_odd_row(outcomes: Outcomes, units: Sequence[str]) -> None:
     """
     columns = np.abs(outcomes.values).T
     for column, own, unit in zip(columns, outcomes.units, units, strict=True):
-        unit = known_unit(unit) or unit
         odd = np.array([judge_unit(unit, number) not in (unit, None) for number in column])
         if not 0 < odd.sum() < len(odd) / 2 or (own and is_possible(own, max(column[odd]))):
             continue
