@@ -17,7 +17,7 @@ from prior_reinforce.arm.recordings.units import (
     listed,
 )
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
-from prior_reinforce.units import base_of, factor, kind_of
+from prior_reinforce.units import base_of, factor, kind_of, looks_like
 
 _FAR, _FEW = 10.0, 3
 """Times as far as all others that an outcome is in another unit, and outcomes of which it is not
@@ -102,11 +102,14 @@ def in_units(
     values, sd = outcomes.values * np.array(scale), outcomes.sd * sd_scale
     converted = replace(outcomes, values=values, sd=sd, units=tuple(wanted), sd_unit=first)
     apart = float(np.nanmax(np.ptp(values, axis=0), initial=0.0)) if len(values) else 0.0
-    if outcomes.sd_unit is None and 0 < apart <= sd.max() and len(values) > _FEW:
+    most, as_wide = float(sd.max(initial=0.0)), ""
+    if len(values) > _FEW and 0 < apart <= most:
+        as_wide = f", and all outcomes are within {apart:.4g} {first} of each other"
+    looks = looks_like(first, most, error=True) or (as_wide and "cm")
+    if outcomes.sd_unit is None and looks:
         raise InvalidDemonstrationsError(
-            f"{SD} in {where} is up to {sd.max():.4g} {first}, and all outcomes are within "
-            f"{apart:.4g} {first} of each other; say its unit in its head: {SD} [cm], or "
-            f"{SD} [{first}] if that is right"
+            f"{SD} in {where} is up to {most:.4g} {first}{as_wide}; say its unit in its head: "
+            f"{SD} [{looks}], or {SD} [{first}] if that is right"
         )
     return converted, ambiguities
 
@@ -117,7 +120,7 @@ def _refuse_one_unit(outcomes: Outcomes, wanted: Sequence[str], unclear: Sequenc
     So do numbers of which some are plausible as they are: were all in the unit that the others look
     like, the object would hardly leave the base along them.
 
-    InvalidDemonstrationsError says what to write in the head.
+    InvalidDemonstrationsError says the option if all are in one, and what to write in the head.
     """
     far = np.nanmax(np.abs(outcomes.values), axis=0, initial=0.0)
     looks = [judge_unit(unit, most) or unit for unit, most in zip(wanted, far, strict=True)]
@@ -131,10 +134,12 @@ def _refuse_one_unit(outcomes: Outcomes, wanted: Sequence[str], unclear: Sequenc
         names = [outcomes.names[j] for j in unsaid]
         each = ", ".join(f"{outcomes.names[j]} {far[j]:.4g}" for j in unsaid)
         heads = [f"{name} [{looks[j]}]" for name, j in zip(names, unsaid, strict=True)]
+        one = ""
+        if len(unclear) == 1 and {kind_of(wanted[j]) for j in unsaid} == {"length"}:
+            one = f"--outcome-unit {unclear[0]} (or {wanted[unsaid[0]]}) if all are in that, else "
         raise InvalidDemonstrationsError(
             f"in {outcomes.where}, the largest numbers are {each}, which look like several units: "
-            f"say each one's in the head (if they are these: {', '.join(heads)}), or "
-            "--outcome-unit if all are in one"
+            f"say {one}each one's in the head (if they are these: {', '.join(heads)})"
         )
 
 
