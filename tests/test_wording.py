@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from prior_reinforce.errors import InvalidFeedbackError
 from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.parsing import from_words, read_numbers, read_place, with_points
 from prior_reinforce.wording import in_words, say_chance, say_length, say_place, to_words
 
 METRES = OutcomeFormat.metres(2)
@@ -83,3 +85,56 @@ def test_lengths(length, form, said):
 def test_a_chance_is_one_of_three_words():
     said = [say_chance(p) for p in (0.0, 0.0999, 0.1, 0.43, 0.6499, 0.65, 1.0)]
     assert said == ["unlikely"] * 2 + ["possible"] * 3 + ["likely"] * 2
+
+
+@pytest.mark.parametrize("unit", ["%", "degrees", "°", "inch", "turn", "M", "Seconds", "pins"])
+def test_a_unit_in_another_spelling_is_read_as_it_is_printed(unit):
+    form = OutcomeFormat(("a",), (unit,))
+    assert form.units == (unit,)
+    said = say_place([3.0], form).removeprefix("a ")
+    np.testing.assert_allclose(read_place(said, form), [3.0])
+    word = "late" if unit == "Seconds" else "long"
+    np.testing.assert_allclose(from_words(f"{said} {word}", form).error_seen, [3.0])
+
+
+@pytest.mark.parametrize(
+    ("text", "units", "place"),
+    [
+        ("3,5 N", ["N"], [3.5]),
+        ("3,5 °C", ["°C"], [3.5]),
+        ("3,5 N·m", ["N·m"], [3.5]),
+        ('1,5" 0', ["in", "in"], [1.5, 0]),
+        ("0,92; 0,1", ["m", "m"], [0.92, 0.1]),
+        ("0,5 0,25 cm", ["m", "m"], [0.005, 0.0025]),
+        ("0.92; 0.1", ["m", "m"], [0.92, 0.1]),
+    ],
+)
+def test_a_comma_is_decimal_before_any_unit_and_between_semicolons(text, units, place):
+    np.testing.assert_allclose(read_place(text, of(*units)), place)
+
+
+@pytest.mark.parametrize("text", ["1,500 N", "1,500 °C", '1,500"', "1,500; 0,300"])
+def test_what_may_be_a_thousand_of_any_unit_is_refused(text):
+    units = {"N": ["N"], "C": ["°C"], '"': ["in"]}.get(text[-1], ["m", "m"])
+    with pytest.raises(InvalidFeedbackError, match=r"may be a thousand; write 1500, or 1\.500"):
+        read_place(text, of(*units))
+
+
+def test_a_range_has_decimal_commas():
+    for text in ("1,5-2,5 cm short", "1,5 – 2,5 cm short", "1,5cm-2,5 cm short"):
+        seen = from_words(text, METRES)
+        np.testing.assert_allclose([seen.low[0], seen.high[0]], [-0.025, -0.015])
+    assert from_words("1,5 +- 0,5 cm short", METRES).sd[0] == pytest.approx(0.005)
+    assert read_numbers(with_points("5+-1,2+-1", 2)) == [(5, 1), (2, 1)]
+    with pytest.raises(InvalidFeedbackError, match="may be a thousand"):
+        from_words("1,500-2,500 mm short", METRES)
+
+
+def test_one_number_with_a_comma_is_not_two_far_ones():
+    with pytest.raises(InvalidFeedbackError, match="'0,92' may be one number; give 2 finite"):
+        read_place("0,92", METRES)
+
+
+def test_no_empty_example_is_given_of_a_task_that_has_none():
+    with pytest.raises(InvalidFeedbackError, match=r'left, right, or "hit"$'):
+        from_words("green", of("pins", "pins"))

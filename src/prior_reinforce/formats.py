@@ -16,7 +16,7 @@ from typing_extensions import Self
 
 from prior_reinforce.arrays import Point
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.units import UNITS, looks_like
+from prior_reinforce.units import UNITS, looks_like, spelt
 
 _LEAST_SD = 1 / 3
 """Least sd of a number of unknown origin, in tolerances (ours): half a centimetre of 1.5 cm. Who
@@ -87,6 +87,13 @@ class OutcomeFormat:
                 units, or one that looks like another unit's: 1.5 m.
         """
         return replace(self, tolerance=self._checked(tolerance))
+
+    def as_listed(self) -> Self:
+        """Return the format with each unit by its name in `units`: `deg` where it is spelt `°`.
+
+        To read words only: stored fingerprints have the task's own spelling.
+        """
+        return replace(self, units=tuple(spelt(unit) or unit for unit in self.units))
 
     def slip(self, numbers: Iterable[float], *, error: bool) -> str:
         """Say which number looks like another unit's; empty if all are plausible.

@@ -42,13 +42,14 @@ _FAR = 10.0
 """Tolerances from which an error is looked at twice (ours): 15 cm, where 1.5 cm are allowed. It is
 taken for an outcome, or an outcome for an error, where that would be four times nearer."""
 _TOO_LARGE = {"length": "farther than any arm throws", "angle": "more than a turn"}
-_SOMEWHERE = "somewhere"
+_SOMEWHERE, _LOST = "somewhere", "lost"
 _ON_THE_GOAL = ("on the goal", "spot on", "0")
-_LOST = "lost"
 _HITS = {"hit": True, "miss": False, _LOST: False}
 _FILLERS = re.compile(r"\b(?:about|approximately|approx\.?|around|roughly|circa|ca\.?|too)\s+|~\s*")
 """What people say beside a length, which is an estimate anyway."""
-_DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d+\s*[a-z])")
+_INNER_COMMA = re.compile(r"(?<=\d),(?=\d)")
+_DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d+\s*(?:[-–±+/]+\s*[\d.,]+\s*)?(?:[^\W\d_]|[°\"%]))")
+_BETWEEN, _LAST_UNIT = re.compile(r"[;,]?\s+|;"), re.compile(r"\s*(?:[^\W\d_]|[°\"%])\S*$")
 _RANGE = re.compile(r"(?<=[\da-z\"°.])\s*(?:–|-|\bto\b)\s*(?=\.?\d)")
 _COMMA, _NEXT = re.compile(r"\s*(?:,|;|\band\b)\s*"), re.compile(r"(?<=[a-z])\s+(?=\.?\d)")
 _PLUS_MINUS = r"(?:\+-|\+/-|±)"
@@ -81,20 +82,19 @@ def _patterns(units: tuple[str, ...]) -> tuple[re.Pattern[str], ...]:
     )
     word_first = rf"([a-z]+)\s+(?:by\s+)?((?:{_NUMBER})\s*(?:{unit}))"
     place = rf"(?P<number>[+-]?(?:{_NUMBER}))\s*(?P<unit>{unit})(?:\s*[,;]\s*|\s+|$)"
-    return tuple(map(re.compile, (term, word_first, place)))
+    return tuple(re.compile(each, re.IGNORECASE) for each in (term, word_first, place))
 
 
 def with_points(text: str, k: int) -> str:
     """Return a text whose decimal commas are points, and whose minuses are as typed.
 
-    A comma is decimal where letters follow its number, `1,2 cm`, or where there are as many numbers
-    as components, `0,92 0,1` of two. InvalidFeedbackError where it may part thousands: `1,500 mm`.
+    A comma is decimal where a unit, a word or a range follows, `1,2 cm`, or where there are k
+    numbers, `0,92 0,1 m` of two. InvalidFeedbackError where it may part thousands: `1,500 mm`.
     """
-    text, numbers = text.replace("\u2212", "-"), text.split()
-    if len(numbers) == k and all(map(_WITH_COMMA.fullmatch, numbers)):
-        pointed = text.replace(",", ".")
-    else:
-        pointed = _DECIMAL_COMMA.sub(".", text)
+    text = text.replace("\u2212", "-")
+    numbers = _BETWEEN.split(_LAST_UNIT.sub("", text.strip()))
+    all_numbers = len(numbers) == k and all(map(_WITH_COMMA.fullmatch, numbers))
+    pointed = (_INNER_COMMA if all_numbers else _DECIMAL_COMMA).sub(".", text)
     if pointed != text and (found := _THOUSAND.search(text)):
         whole, decimal = found[0].replace(",", ""), found[0].replace(",", ".")
         raise InvalidFeedbackError(
@@ -124,26 +124,23 @@ def from_words(text: str, form: OutcomeFormat | None = None) -> Reading:
     Raises:
         InvalidFeedbackError: Unknown words, or one direction named twice.
     """
-    form = form or OutcomeFormat.metres(2)
+    form = (form or OutcomeFormat.metres(2)).as_listed()
     parts = _parts(text, form)
     hits = {_HITS[part] for part in parts if part in _HITS}
     if len(hits) > 1:
         raise InvalidFeedbackError(f"{text!r} says hit and miss; say one of them")
     hit = hits.pop() if hits else None
     directed = [part for part in parts if part not in (*_HITS, _SOMEWHERE, *_ON_THE_GOAL)]
-    lost = _LOST in parts
-    if lost and directed:
+    if _LOST in parts and directed:
         raise InvalidFeedbackError(
             f"{text!r} says where it went and that it was lost; say one of them"
         )
     if hit is not None and not directed:
-        return replace(Reading.only(hit, form.outcome_dim, lost=lost), said=text)
+        return replace(Reading.only(hit, form.outcome_dim, lost=_LOST in parts), said=text)
     terms = _terms(directed, text, form)
     understood = {term.part: term.said for term in terms.values()}
-    if any(part != said for part, said in understood.items()):
-        said = ", ".join(understood.get(part, part) for part in parts)
-    else:
-        said = text
+    as_it_is = all(part == said for part, said in understood.items())
+    said = text if as_it_is else ", ".join(understood.get(part, part) for part in parts)
     return replace(_reading(terms, text, form, _SOMEWHERE in parts), hit=hit, said=said)
 
 
@@ -259,7 +256,8 @@ def as_place(place: ArrayLike | str, form: OutcomeFormat) -> Point:
 
 def read_numbers(text: str) -> list[tuple[float, float | None]] | None:
     """Read numbers, each with that after its `+-` (`0.05+-0.003, -0.02 ± 0.001`); None if none."""
-    parts = re.sub(rf"\s*{_PLUS_MINUS}\s*", "±", text).replace(",", " ").split()
+    mark = ";" if ";" in text else ","
+    parts = re.sub(rf"\s*{_PLUS_MINUS}\s*", "±", text).replace(mark, " ").split()
     try:
         split = [part.split("±") for part in parts]
         return [(float(number), float(*sd) if sd else None) for number, *sd in split]
@@ -292,7 +290,7 @@ def read_place(text: str, form: OutcomeFormat) -> Point:
     """
     if re.search(_PLUS_MINUS, text):
         raise InvalidFeedbackError(f"cannot read {text!r} as one place; leave out the +-")
-    k = form.outcome_dim
+    k, form = form.outcome_dim, form.as_listed()
     expected = f"{k} finite numbers: {', '.join(form.names)}"
     numbers = _numbers_with_units(text.replace("\u2212", "-"), form.units)
     if numbers is None or len(numbers) != k:
@@ -311,6 +309,8 @@ def read_place(text: str, form: OutcomeFormat) -> Point:
     for number, unit in zip(numbers, form.units, strict=True):
         possible = unit == "m" and not looks_like(unit, number, stated=True)
         said = looks_like(unit, number)
+        if said and not looks_like(unit, numbers[0]) and _WITH_COMMA.fullmatch(text.strip()):
+            raise InvalidFeedbackError(f"{text!r} may be one number; give {expected}")
         if said and not (stated and possible):
             raise InvalidFeedbackError(
                 f"{number:g} {unit} is {_TOO_LARGE[kind_of(unit)]}; say the unit, for instance "
@@ -324,8 +324,7 @@ def _numbers_with_units(text: str, units: Sequence[str]) -> list[float] | None:
 
     A unit after the last number only is that of all.
     """
-    bare = read_numbers(text)
-    if bare is not None:
+    if (bare := read_numbers(text)) is not None:
         return [number for number, _ in bare]
     terms = list(_patterns(tuple(units))[2].finditer(text.strip()))
     if "".join(term[0] for term in terms) != text.strip():
@@ -337,10 +336,11 @@ def _numbers_with_units(text: str, units: Sequence[str]) -> list[float] | None:
         return [math.nan] * len(stated)
     numbers = []
     for term, unit, wanted in zip(terms, stated, units, strict=True):
-        scale = factor(unit, wanted) if unit else None
+        number = float(term["number"])
+        scale = factor(unit or (wanted if number == 0.0 else ""), wanted)
         if scale is None:
             return None
-        numbers.append(float(term["number"]) * scale)
+        numbers.append(number * scale)
     return numbers
 
 
@@ -444,7 +444,7 @@ def _unread(part: str, text: str, known: Sequence[str], form: OutcomeFormat, pla
             f"{part!r} may be straight to the place or along x only; measure along x and say "
             f"{from_base['length']} {known[0]}"
         )
-    example = '"92cm ahead, 10cm left"' if place else f'"{error_example(form)}", or "hit"'
+    example = "92cm ahead, 10cm left" if place else error_example(form)
+    said = f', for instance "{example}"' * bool(example) + ', or "hit"' * (not place)
     where = "" if part == text.strip().lower() else f" in {text!r}"
-    said = f"cannot read {part!r}{where}; write a length and one of {', '.join(known)}"
-    return f"{said}, for instance {example}"
+    return f"cannot read {part!r}{where}; write a length and one of {', '.join(known)}{said}"

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from prior_reinforce.arm.recordings import import_demonstrations
-from prior_reinforce.arm.recordings.outcomes import (
-    read_outcomes,
-)
+from prior_reinforce.arm.recordings.outcome_units import in_units
+from prior_reinforce.arm.recordings.outcomes import read_outcomes
 from prior_reinforce.errors import (
     ConfigurationError,
     InvalidDemonstrationsError,
@@ -100,7 +99,9 @@ def test_metres_that_are_said_may_be_as_far_as_a_bat_strikes(recording, tmp_path
         import_demonstrations(recording, outcomes=path)  # a table that we wrote is headed so
     bare = table(tmp_path, "\n".join(["episode,x,y", *rows]))
     assert import_demonstrations(recording, outcomes=bare, outcome_unit="m").demonstrations.n == 6
-    with pytest.raises(InvalidDemonstrationsError, match=r"x 10.05, y 0.14, .* --outcome-unit if"):
+    with pytest.raises(
+        InvalidDemonstrationsError, match=r"x 10.05, y 0.14, .* --outcome-unit cm \(or m\)"
+    ):
         import_demonstrations(recording, outcomes=bare)
 
 
@@ -157,6 +158,25 @@ def test_a_spread_as_large_as_the_outcomes_lie_apart_is_doubted(recording, tmp_p
             recording, outcomes=table(tmp_path, "\n".join([head, *rows]))
         ).demonstrations
         np.testing.assert_allclose(found.outcome_noise, noise)
+
+
+def test_a_spread_of_a_metre_is_doubted_however_few_throws_there_are(tmp_path):
+    path = table(tmp_path, "episode,x,y,sd\n0,0.9,0.1,1\n")
+    with pytest.raises(
+        InvalidDemonstrationsError, match=r"sd in .* is up to 1 m; .*: sd \[cm\], or"
+    ):
+        in_units(read_outcomes(path), None, None)
+    for unit, sd in (("cm", 0.01), ("m", 1.0)):
+        path.write_text(f"episode,x,y,sd [{unit}]\n0,0.9,0.1,1\n")
+        np.testing.assert_allclose(in_units(read_outcomes(path), None, None)[0].sd, sd)
+
+
+def test_one_unit_of_all_is_named_before_one_for_each(tmp_path):
+    path = table(tmp_path, "episode,x,y\n0,90,-2\n1,100,0\n2,120,3\n")
+    said = r"--outcome-unit cm \(or m\) if all are in that, else .*: x \[cm\], y \[m\]\)"
+    with pytest.raises(InvalidDemonstrationsError, match=said):
+        in_units(read_outcomes(path), None, None)
+    np.testing.assert_allclose(in_units(read_outcomes(path), None, "cm")[0].values[2], [1.2, 0.03])
 
 
 def test_a_column_may_end_in_inches_where_the_task_has_that_name(tmp_path):

@@ -17,7 +17,7 @@ from prior_reinforce.arm.recordings.units import (
     listed,
 )
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
-from prior_reinforce.units import base_of, factor, kind_of
+from prior_reinforce.units import base_of, factor, kind_of, looks_like
 
 _FAR, _FEW = 10.0, 3
 """Times as far as all others that an outcome is in another unit, and outcomes of which it is not
@@ -42,6 +42,7 @@ def in_units(
         InvalidDemonstrationsError: A stated unit is impossible.
     """
     said, where, given = outcomes.units, outcomes.where, given and (known_unit(given) or given)
+    wanted = wanted and [known_unit(unit) or unit for unit in wanted]
     if wanted is None:
         wanted = [base_of(unit or given or "m")[0] for unit in said]
     if len(wanted) != len(said):
@@ -58,19 +59,19 @@ def in_units(
     _refuse_odd_row(outcomes, wanted)
     reach = np.abs(outcomes.values).max(axis=0, initial=0.0, where=~np.isnan(outcomes.values))
     unsaid = {
-        j: known_unit(spelt) or spelt
-        for j, (own, spelt) in enumerate(zip(said, wanted, strict=True))
-        if own is None and given is None and kind_of(known_unit(spelt) or spelt) == "length"
+        j: unit
+        for j, (own, unit) in enumerate(zip(said, wanted, strict=True))
+        if own is None and given is None and kind_of(unit) == "length"
     }
     together = max((reach[j] for j in unsaid), default=0.0)  # lengths of one table have one unit
     scale, unclear = [], dict[str, list[str]]()
-    for j, (name, own, spelt) in enumerate(zip(outcomes.names, said, wanted, strict=True)):
-        unit, largest = known_unit(spelt) or spelt, reach[j]
+    for j, (name, own, unit) in enumerate(zip(outcomes.names, said, wanted, strict=True)):
+        largest = reach[j]
         judged = together if len({*unsaid.values()}) == 1 and j in unsaid else largest
         recorded = own or given or judge_unit(unit, judged) or unit
         if base_of(recorded)[0] != base_of(unit)[0]:
             raise ConfigurationError(
-                f"{name} in {where} is in {recorded}, but its unit is to be {spelt}; correct "
+                f"{name} in {where} is in {recorded}, but its unit is to be {unit}; correct "
                 "either (a workspace has it in workspace.toml, [outcome])"
             )
         scale.append(conversion(recorded, unit, f"{name} in {where}"))
@@ -96,16 +97,19 @@ def in_units(
         )
         for unit, reached in unclear.items()
     )
-    first = known_unit(wanted[0]) or wanted[0] if wanted else ""
+    first = wanted[0] if wanted else ""
     sd_scale = conversion(outcomes.sd_unit, first, SD) if outcomes.sd_unit else [*scale, 1.0][0]
     values, sd = outcomes.values * np.array(scale), outcomes.sd * sd_scale
     converted = replace(outcomes, values=values, sd=sd, units=tuple(wanted), sd_unit=first)
     apart = float(np.nanmax(np.ptp(values, axis=0), initial=0.0)) if len(values) else 0.0
-    if outcomes.sd_unit is None and 0 < apart <= sd.max() and len(values) > _FEW:
+    most, as_wide = float(sd.max(initial=0.0)), ""
+    if len(values) > _FEW and 0 < apart <= most:
+        as_wide = f", and all outcomes are within {apart:.4g} {first} of each other"
+    looks = looks_like(first, most, error=True) or (as_wide and "cm")
+    if outcomes.sd_unit is None and looks:
         raise InvalidDemonstrationsError(
-            f"{SD} in {where} is up to {sd.max():.4g} {first}, and all outcomes are within "
-            f"{apart:.4g} {first} of each other; say its unit in its head: {SD} [cm], or "
-            f"{SD} [{first}] if that is right"
+            f"{SD} in {where} is up to {most:.4g} {first}{as_wide}; say its unit in its head: "
+            f"{SD} [{looks}], or {SD} [{first}] if that is right"
         )
     return converted, ambiguities
 
@@ -116,25 +120,26 @@ def _refuse_one_unit(outcomes: Outcomes, wanted: Sequence[str], unclear: Sequenc
     So do numbers of which some are plausible as they are: were all in the unit that the others look
     like, the object would hardly leave the base along them.
 
-    InvalidDemonstrationsError says what to write in the head.
+    InvalidDemonstrationsError says the option if all are in one, and what to write in the head.
     """
     far = np.nanmax(np.abs(outcomes.values), axis=0, initial=0.0)
-    own = [known_unit(unit) or unit for unit in wanted]
-    looks = [judge_unit(unit, most) or unit for unit, most in zip(own, far, strict=True)]
+    looks = [judge_unit(unit, most) or unit for unit, most in zip(wanted, far, strict=True)]
     unsaid = [j for j, unit in enumerate(outcomes.units) if unit is None]
     several = len({kind_of(unit) for unit in unclear}) > 1
     for unit in unclear:
-        alike = [j for j in unsaid if kind_of(own[j]) == kind_of(unit) == "length"]
-        near = [far[j] * (factor(unit, "m") or 1.0) for j in alike if looks[j] == own[j]]
+        alike = [j for j in unsaid if kind_of(wanted[j]) == kind_of(unit) == "length"]
+        near = [far[j] * (factor(unit, "m") or 1.0) for j in alike if looks[j] == wanted[j]]
         several |= any(0 < most < _NEAR_THE_BASE for most in near)
     if several:
         names = [outcomes.names[j] for j in unsaid]
         each = ", ".join(f"{outcomes.names[j]} {far[j]:.4g}" for j in unsaid)
         heads = [f"{name} [{looks[j]}]" for name, j in zip(names, unsaid, strict=True)]
+        one = ""
+        if len(unclear) == 1 and {kind_of(wanted[j]) for j in unsaid} == {"length"}:
+            one = f"--outcome-unit {unclear[0]} (or {wanted[unsaid[0]]}) if all are in that, else "
         raise InvalidDemonstrationsError(
             f"in {outcomes.where}, the largest numbers are {each}, which look like several units: "
-            f"say each one's in the head (if they are these: {', '.join(heads)}), or "
-            "--outcome-unit if all are in one"
+            f"say {one}each one's in the head (if they are these: {', '.join(heads)})"
         )
 
 
@@ -145,7 +150,6 @@ def _refuse_odd_row(outcomes: Outcomes, units: Sequence[str]) -> None:
     """
     columns = np.abs(outcomes.values).T
     for column, own, unit in zip(columns, outcomes.units, units, strict=True):
-        unit = known_unit(unit) or unit
         odd = np.array([judge_unit(unit, number) not in (unit, None) for number in column])
         if not 0 < odd.sum() < len(odd) / 2 or (own and is_possible(own, max(column[odd]))):
             continue
