@@ -5,6 +5,7 @@ import pytest
 
 from prior_reinforce.arm.recordings import import_demonstrations
 from prior_reinforce.arm.recordings.outcomes import (
+    check_rows,
     digits_at_end,
     missing_outcomes,
     read_outcomes,
@@ -367,3 +368,9 @@ def test_asking_for_some_episodes_does_not_hide_another_numbering(recording, tmp
     path = table(tmp_path, "\n".join(["episode,x,y", *rows_of_outcomes(first=1)]))
     with pytest.raises(InvalidDemonstrationsError, match="renumber"):
         import_demonstrations(recording, outcomes=path, episodes=["1", "2", "3"])
+
+
+def test_a_table_with_a_column_for_each_episode_is_to_be_turned(tmp_path):
+    path = table(tmp_path, "episode,throw_0,throw_1\nx [m],0.8,0.9\ny [m],0.1,-0.1\n")
+    with pytest.raises(InvalidDemonstrationsError, match="exchange rows and columns"):
+        check_rows(read_outcomes(path), ("throw_0", "throw_1"), ("throw_0", "throw_1"))

@@ -295,6 +295,11 @@ def check_rows(
     rows, picked = outcomes.episodes, _matched(chosen, outcomes.episodes).values()
     known = {*there, *picked} | {digits_at_end(name) for name in there} - {""}
     unknown = [name for name in rows if name not in known and digits_at_end(name) not in known]
+    if unknown and {*outcomes.names} & {*there}:
+        raise InvalidDemonstrationsError(
+            f"{outcomes.where} has a row for {listed(unknown)} and a column for each episode; "
+            "exchange rows and columns"
+        )
     if unknown and (not others or _renumber(there, rows)):
         raise InvalidDemonstrationsError(
             f"{outcomes.where} names episodes {listed(unknown)} that were not found (there are "
