@@ -157,6 +157,7 @@ def test_a_calibration_is_of_a_picture_and_scaled_to_others_of_its_shape(tmp_pat
     assert again.in_picture((1920, 1080)) is again
     smaller = again.in_picture((1280, 720))
     np.testing.assert_allclose(smaller.to_table(pixels * 2 / 3), GRID, atol=1e-9)
+    np.testing.assert_allclose(smaller.clicked, np.multiply(again.clicked, 2 / 3))
     for size in ((1080, 1920), (1440, 1080), (1920, 1200)):
         with pytest.raises(ConfigurationError, match="calibrate again"):
             again.in_picture(size)

@@ -208,7 +208,12 @@ class TableCalibration:
                 f"{_by(size)}, which is turned or cut; take it as before, or calibrate again"
             )
         homography = np.diag([per_x, per_y, 1.0]) @ self.homography
-        return replace(self, homography=homography / np.linalg.norm(homography), picture=size)
+        clicked = self.clicked
+        if clicked is not None:
+            left, top, right, bottom = clicked
+            clicked = left * per_x, top * per_y, right * per_x, bottom * per_y
+        homography /= np.linalg.norm(homography)
+        return replace(self, homography=homography, picture=size, clicked=clicked)
 
     def at_height(self, height: float, camera_position: ArrayLike) -> TableCalibration:
         """Return the calibration of a parallel plane, from where the camera hangs.
