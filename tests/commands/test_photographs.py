@@ -353,6 +353,18 @@ def test_a_coarse_calibration_names_its_worst_point(tmp_path, run):
     assert "beside" not in err
 
 
+@pytest.mark.parametrize("mistyped", [0.0, 0.1])
+def test_four_corners_and_the_middle_blame_no_point(mistyped, tmp_path, run):
+    """Each four of the five agree, and without a corner the others do not tell where it is."""
+    clicked = [(0.6, -0.4, 1184.5, 764.5), (0.6, 0.4 + mistyped, 736.5, 763.5)]
+    clicked += [(1.4, 0.4, 735.5, 316.5), (1.4, -0.4, 1184.5, 316.5), (1, 0, 960.5, 539.5)]
+    points = points_file(tmp_path / "points.csv", clicked)
+    _, said, err = run("calibrate", points, "--out", tmp_path / "table.json")
+    assert ("calibrated to 0.20 cm" in said) == (mistyped == 0)
+    assert ("that is coarse; give more points" in err) == (mistyped > 0)
+    assert "others agree" not in err
+
+
 def test_a_camera_that_was_measured_from_elsewhere_is_told(tmp_path, run):
     """`POINTS` are seen from straight above (0.9, 0), at any height."""
     points = points_file(tmp_path / "points.csv")

@@ -69,7 +69,7 @@ def test_four_points_say_nothing_of_the_error():
     calibration = TableCalibration.fit(CORNERS, pixels)
     assert calibration.fit_error < 1e-9
     assert calibration.left_out_error is None
-    assert "a fifth" in calibration.summary()
+    assert "one point more" in calibration.summary()
 
 
 @pytest.mark.parametrize(("made_at", "wanted_at"), [(0.0, 0.1), (0.1, 0.0), (0.03, 0.2)])
@@ -157,6 +157,7 @@ def test_a_calibration_is_of_a_picture_and_scaled_to_others_of_its_shape(tmp_pat
     assert again.in_picture((1920, 1080)) is again
     smaller = again.in_picture((1280, 720))
     np.testing.assert_allclose(smaller.to_table(pixels * 2 / 3), GRID, atol=1e-9)
+    np.testing.assert_allclose(smaller.clicked, np.multiply(again.clicked, 2 / 3))
     for size in ((1080, 1920), (1440, 1080), (1920, 1200)):
         with pytest.raises(ConfigurationError, match="calibrate again"):
             again.in_picture(size)
@@ -188,6 +189,20 @@ def test_the_spread_is_no_smaller_than_what_is_left_out():
     off, others_off = left_out_errors(typed, pixels)
     assert np.argmin(others_off) == 1
     assert off[1] > 0.08
+
+
+@pytest.mark.parametrize("beside", [0.0, 0.003, 0.02])
+def test_a_corner_that_the_other_points_cannot_predict_does_not_count(beside):
+    """Without a corner, the middle is on the line of two others; a click's noise hides that."""
+    points = np.vstack([CORNERS, np.add(CORNERS.mean(axis=0), (beside, 0.0))])
+    clicks = np.array([[-0.5, 0.5], [0.5, -0.5], [-0.5, -0.5], [0.5, 0.5], [0.5, 0.0]])
+    pixels = through_pinhole(at(points, 0.0)) + clicks
+    off, others_off = left_out_errors(points, pixels)
+    np.testing.assert_array_equal(np.isnan(off), [True, True, True, True, False])
+    np.testing.assert_array_equal(np.isnan(others_off), np.isnan(off))
+    calibration = TableCalibration.fit(points, pixels)
+    assert calibration.left_out_error == pytest.approx(off[4])
+    assert calibration.sd < 0.004
 
 
 @pytest.mark.parametrize("aside", [0.01, 0.05, 0.2])

@@ -12,11 +12,12 @@ from PIL import Image
 
 from prior_reinforce.environment import Rollout, TableScene
 from prior_reinforce.errors import ConfigurationError, EndpointError, PerceptionFailedError
+from prior_reinforce.perception.calibration import TableCalibration
 from prior_reinforce.perception.camera import Camera, CameraConfig
 from prior_reinforce.perception.colour_camera import ColourClient, find_by_colour, say_box
 from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
-from prior_reinforce.perception.vlm_reading import Answer
+from prior_reinforce.perception.vlm_reading import Answer, Sighting
 from tests.perception.slanted_table import BALL, GOAL, RIM_HEIGHT, SCENE
 from tests.perception.vision_server import VisionServer
 
@@ -261,6 +262,56 @@ def test_loose_boxes_in_the_right_order_are_not_taken_for_swapped_ones(
         client = Says(loose=loose)
         perception = VisionLanguageModel(SCENE, how, client=client, calibration=calibration)
         assert "swapped" not in (perception.read(picture).problem or "")
+
+
+@pytest.fixture(scope="module")
+def slanted():
+    """A camera that looks at the table's middle, 30 degrees off the vertical, in 1920 x 1080 px."""
+    return Slanted()
+
+
+class Slanted:
+    """Boxes in pixels of a picture that is not drawn, around two objects on the table."""
+
+    def __init__(self):
+        grid = np.array([(x, y) for x in (0.7, 1.0, 1.3) for y in (-0.4, 0.0, 0.4)])
+        forward = np.array([0.5, 0.0, -np.sqrt(0.75)])
+        right = np.array([0.0, -1.0, 0.0])
+        axes = np.stack([right, np.cross(forward, right), forward], axis=1)
+        seen = (np.insert(grid, 2, 0.0, axis=1) - ([1, 0, 0] - 1.8 * forward)) @ axes
+        pixels = [960, 540] + 1300 * seen[:, :2] / seen[:, 2:]
+        self.calibration = TableCalibration.fit(grid, pixels, picture=(1920, 1080))
+        self.picture = np.zeros((1080, 1920, 3), np.uint8)
+
+    def verdict(self, places, loose, *, swaps=False):
+        """The goal's sighting, of boxes so many times as large as a ball and as a flat ring."""
+        how, found = VisionLanguageModelConfig(family="qwen2.5-vl"), []
+        for i, wanted in enumerate((SCENE.reached, SCENE.goal)):
+            centre = self.calibration.to_pixels(places[i])
+            disc, ball = self.calibration.seen(centre, wanted.size)
+            half = loose[i] * (disc if i else ball) / 2
+            box = np.array([centre - half, centre + half])[:, :: -1 if swaps else 1].ravel()
+            found.append(Sighting(wanted.words, (), tuple(box.tolist()), np.array(places[i])))
+        with VisionLanguageModel(
+            SCENE, how, client=ColourClient(), calibration=self.calibration
+        ) as perception:
+            return perception._of_one_scale(*found, self.picture)
+
+
+def test_too_large_boxes_in_pixels_of_a_slanted_camera_are_not_taken_for_swapped_ones(slanted):
+    rng, told = np.random.default_rng(0), []
+    for _ in range(60):
+        places = rng.uniform([0.6, -0.4], [1.3, 0.4], size=(2, 2))
+        told.append(slanted.verdict(places, rng.uniform(1.15, 1.35, size=(2, 2))).problem or "")
+    assert not any("swapped" in problem for problem in told)
+
+
+def test_swapped_boxes_of_which_no_family_is_read_say_so(slanted):
+    places = [[1.3, -0.4], [1.2, -0.3]]
+    problem = slanted.verdict(places, np.ones((2, 2)), swaps=True).problem
+    assert "only with x and y swapped: 'qwen2.5-vl' is read x first" in problem
+    assert problem.endswith("and no family is read so")
+    assert "set family to" not in problem
 
 
 @pytest.mark.parametrize("shrunk", [0.5, 0.65, 0.8])

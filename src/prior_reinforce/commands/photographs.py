@@ -110,7 +110,7 @@ class Calibrate:
             )
             if calibration.worst_sd > max(_COARSE, _BESIDE * calibration.fit_error):
                 remedy = " beside the points; give more, in all corners of the table"
-            elif 0 < agree.sum() <= len(agree) / 2:
+            elif 0 < agree.sum() <= np.isfinite(others_off).sum() / 2:
                 remedy = f"; without point {says} the others agree: measure and click it again"
             else:
                 remedy = "; give more points, in all corners of the table"

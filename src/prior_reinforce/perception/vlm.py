@@ -176,7 +176,7 @@ class VisionLanguageModel(Perception):
         found = [(reached.box, self.scene.reached.size), (goal.box, self.scene.goal.size)]
         read = [_misfit(box, calibration, size) for box, size in found]
         swapped = [_misfit(self._swapped(box, wide / tall), calibration, s) for box, s in found]
-        if max(read) > _LOOSE >= max(swapped) and (np.array(swapped) < read).all():
+        if _fits_better(swapped, read):
             return replace(goal, place=None, problem=f"both boxes fit {self._other_order()}")
         small, large, flat = np.array([_against(box, calibration, size) for box, size in found]).T
         if small.max() < _TOO_SMALL and _alike(*small):
@@ -213,8 +213,8 @@ class VisionLanguageModel(Perception):
         named = [name for name, form in FORMATS.items() if replace(form, prompt="") == alike]
         return (
             f"only with x and y swapped: '{self.config.family}' is read {first} first, but the "
-            f"model answers {other} first; set family to {' or '.join(named)}"
-        )
+            f"model answers {other} first"
+        ) + (f"; set family to {' or '.join(named)}" if named else ", and no family is read so")
 
     def find(self, wanted: SeenObject, picture: Picture) -> Sighting:
         """Ask for one object, in an RGB picture of the calibrated camera, until enough agree.
@@ -276,8 +276,9 @@ class VisionLanguageModel(Perception):
             side = np.linalg.norm(corners[1:] - corners[0], axis=1).max()
             if not wanted.size / 2 <= side <= 2 * wanted.size:
                 says = f"a box of {100 * side:.1f} cm for an object of {100 * wanted.size:.1f} cm"
-                swapped = self._swapped((left, top, right, bottom), width / height)
-                if _misfit(swapped, here, wanted.size) <= _LOOSE:
+                read = left, top, right, bottom
+                swapped = self._swapped(read, width / height)
+                if _fits_better(*([_misfit(b, here, wanted.size)] for b in (swapped, read))):
                     says += f", which fits {self._other_order()}"
                 raise UnreadableAnswerError(says)
         except UnreadableAnswerError as error:
@@ -315,6 +316,14 @@ def _misfit(box: Box, calibration: TableCalibration, size: float) -> float:
     sides = np.array([right - left, bottom - top])
     disc, ball = calibration.seen(np.array([(left + right) / 2, (top + bottom) / 2]), size)
     return max((sides / ball).max(), (disc / sides).max())
+
+
+def _fits_better(swapped: list[float], read: list[float]) -> bool:
+    """Whether boxes fit with x and y swapped, and each as read is too far off to be drawn loosely.
+
+    Both are misfits. One as far off as boxes are drawn may fit as well by chance elsewhere.
+    """
+    return max(swapped) <= _LOOSE and max(swapped) * _LOOSE < min(read)
 
 
 def _alike(one: float, other: float) -> bool:
