@@ -323,7 +323,8 @@ def _fits_better(swapped: list[float], read: list[float]) -> bool:
 
     Both are misfits. One as far off as boxes are drawn may fit as well by chance elsewhere.
     """
-    return max(swapped) <= _LOOSE and max(swapped) * _LOOSE < min(read)
+    better = all(s * _LOOSE < r for s, r in zip(swapped, read, strict=True))
+    return max(swapped) <= _LOOSE and better
 
 
 def _alike(one: float, other: float) -> bool:
