@@ -319,9 +319,9 @@ def _misfit(box: Box, calibration: TableCalibration, size: float) -> float:
 
 
 def _fits_better(swapped: list[float], read: list[float]) -> bool:
-    """Whether boxes fit with x and y swapped, and each as read is too far off to be drawn loosely.
+    """Whether boxes fit with x and y swapped, each better by more than boxes are drawn loosely.
 
-    Both are misfits. One as far off as boxes are drawn may fit as well by chance elsewhere.
+    Both are misfits.
     """
     better = all(s * _LOOSE < r for s, r in zip(swapped, read, strict=True))
     return max(swapped) <= _LOOSE and better
