@@ -221,6 +221,7 @@ def test_joints_may_stay_still_on_purpose(tmp_path, absent, message):
             r"joint_names: missing \(and lower, upper, velocity\)",
         ),
         ("dt = 0.02", f"dt = 1{'0' * 400}", "number out of range"),
+        ('model = "none"', 'model = "none"\nheld = { lift = nan }', r"held = .*must be finite"),
         ("[gate]", "[gate]\nworkspace_low = [0, 0]", "expected `array.*` of length 3"),
         ("[gate]", "[gate]\nbox_low = [0, 0, 0]", r"box_low.*unknown; keys are .*workspace_low"),
         ("[gate]", "[gate]\nworkspace_low = [0, 0, 0]", r"\[gate\].*needs both corners"),

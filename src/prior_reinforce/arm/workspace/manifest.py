@@ -435,5 +435,6 @@ class _Reader:
 
 
 def _flat(value: Any) -> list[Any]:
-    """All that lists within lists hold."""
+    """All that lists and tables within each other hold."""
+    value = [*value, *value.values()] if isinstance(value, dict) else value
     return [x for each in value for x in _flat(each)] if isinstance(value, list) else [value]
