@@ -82,3 +82,10 @@ def test_a_threshold_holds_in_every_unit_of_its_kind():
 )
 def test_a_number_that_is_too_large_looks_like_another_unit(unit, number, said, looks):
     assert looks_like(unit, number, **said) == looks
+
+
+def test_a_number_may_stand_before_a_unit():
+    assert factor("0.01 deg", "rad") == pytest.approx(0.01 * math.pi / 180)
+    assert factor("0.1mm", "m") == pytest.approx(1e-4)
+    assert factor("0.01 bar", "rad") is None
+    assert base_of("2 bar") == ("2 bar", 1.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -98,6 +99,9 @@ SPELT = {
 """Unit by each of its spellings, in lower case."""
 
 
+_SCALED = re.compile(r"(\d*\.?\d+) *([^\d\s.].*)")
+
+
 def spelt(text: str) -> str | None:
     """Return the name of the unit that a text spells, `deg` for `°`; None if it spells none."""
     return SPELT.get(text.lower())
@@ -114,8 +118,14 @@ def units_of(kind: Kind) -> dict[str, float]:
 
 
 def base_of(unit: str) -> tuple[str, float]:
-    """Return the base unit and the factor to it, rad and pi/180 for deg; other units stay."""
+    """Return the base unit and the factor to it, rad and pi/180 for deg; other units stay.
+
+    A number may stand before a unit: a motor's `0.01 deg`.
+    """
     known = UNITS.get(unit)
+    if known is None and (scaled := _SCALED.fullmatch(unit)) and spelt(scaled[2]):
+        base, scale = base_of(SPELT[scaled[2].lower()])
+        return base, float(scaled[1]) * scale
     if known is None or known.kind == "share":
         return unit, 1.0
     return next(iter(units_of(known.kind))), known.factor

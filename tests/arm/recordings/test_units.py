@@ -15,6 +15,7 @@ from prior_reinforce.arm.recordings.units import (
     raise_if_ambiguous,
     say_names,
     split_unit,
+    stated_unit,
 )
 from prior_reinforce.errors import ConfigurationError, UnclearUnitsError
 
@@ -118,3 +119,8 @@ def test_many_names_are_few_words():
 def test_what_no_arm_can_do_whoever_says_it(unit, reach, cannot):
     assert is_possible(unit, reach) is not cannot
     assert is_possible("counts", 1e9)
+
+
+def test_a_motors_hundredths_of_a_degree_are_converted():
+    assert stated_unit("pan [0.01 deg]") == ("pan", "0.01 deg")
+    assert conversion("0.01 deg", "rad", "pan") == pytest.approx(math.pi / 18000)

@@ -43,8 +43,8 @@ _NO_ENDING = {
 """Words that are no unit there: in `plug_in`, `q_min`, `firstDay`."""
 _BEFORE_NUMBER = re.compile(r"(?P<name>.+?)_(?P<unit>deg|rad|mm|cm)(?P<number>_?\d+)", re.I)
 """`q_deg_0`."""
-_UNKNOWN = re.compile(r"(?P<name>.+?)\s*\[\s*(?P<unit>[^\W\d_][^\[\]\s]*|%)\s*\]")
-"""`pressure [bar]`, in a unit that this program does not know."""
+_UNKNOWN = re.compile(r"(?P<name>.+?)\s*\[\s*(?P<unit>(?:[\d.]+ ?)?[^\W\d_][^\[\]\s]*|%)\s*\]")
+"""`pressure [bar]`, in a unit that this program does not know, or `q1 [0.01 deg]`."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def conversion(recorded: str, wanted: str, name: str) -> float:
     if scale is None:
         raise ConfigurationError(
             f"{name} is recorded in {recorded}, but plans are in {wanted}; say its unit with "
-            "--units, or correct the plan's units"
+            "--units, such as '0.01 deg', or correct the plan's units"
         )
     return scale
 
