@@ -84,3 +84,11 @@ def test_one_joint_of_a_robot_that_counts_turns_is_not_all_in_degrees(end, optio
     names = ("pan", "lift", "spin")
     found = select(takes(names, end, end), names, names, plan_units=("rad",) * 3)
     assert [one.option for one in found.ambiguities] == [f"--units {option}"]
+
+
+def test_a_gripper_of_another_range_is_told_how_to_say_it():
+    names, plan = ("j1", "gripper"), ("rad", "percent")
+    (asked,) = select(takes(names, (1, 900)), names, names, plan_units=plan).ambiguities
+    assert "'0.1 percent' if its range is 0 to 1000" in asked.what
+    found = select(takes(names, (1, 900)), names, names, ["rad", "0.1 percent"], plan)
+    assert max(r.positions[:, 1].max() for r in found.recordings) == 90

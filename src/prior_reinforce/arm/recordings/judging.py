@@ -257,6 +257,7 @@ class Judge:
             seen = f"it looks like {doubt.looks}"
             if doubt.looks == UNIT:
                 seen = f"put its unit in the place of {UNIT}"
+                seen += " ('0.1 percent' if its range is 0 to 1000)" * (unit == "percent")
             elif doubt.looks == "deg" and self.normalised and worst.largest <= 100:
                 seen += _NORMALISED
             what = (
