@@ -285,3 +285,29 @@ def test_a_gripper_of_plain_numbers_is_named_and_can_be_taken(tmp_path, kind):
     assert not both.left_out
     with pytest.raises(FileFormatError, match="no joint topic /robotiq/position"):
         read_recordings(bag, key="/robotiq/position")
+
+
+def test_a_base_that_drives_is_named_whatever_its_message(tmp_path):
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    types = store.types
+    t, q = sampled(0, 50)
+    state, pose = "sensor_msgs/msg/JointState", "geometry_msgs/msg/PoseStamped"
+    with Writer2(tmp_path / "bag", version=8, storage_plugin=StoragePlugin.MCAP) as bag:
+        topics = [
+            bag.add_connection(topic, kind, typestore=store)
+            for topic, kind in (("/joints", state), ("/base_pose", pose), ("/tcp_pose", pose))
+        ]
+        for at, row in zip(t, q, strict=True):
+            stamp = types["builtin_interfaces/msg/Time"](int(at), round(at % 1 * 1e9))
+            header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="")
+            empty = np.zeros(0)
+            joints = types[state](header, list(JOINTS), row, empty, empty)
+            place = types["geometry_msgs/msg/Point"](x=0.3 * at, y=0.0, z=0.0)
+            turn = types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)
+            there = types[pose](header, types["geometry_msgs/msg/Pose"](place, turn))
+            for topic, message, kind in zip(
+                topics, (joints, there, there), (state, pose, pose), strict=True
+            ):
+                bag.write(topic, round(at * 1e9), store.serialize_cdr(message, kind))
+    (read,) = read_recordings(tmp_path / "bag")
+    assert read.left_out == {"/base_pose": (0.0, pytest.approx(0.3 * t[-1]))}

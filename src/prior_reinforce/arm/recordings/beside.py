@@ -84,7 +84,7 @@ def moves_beside(
     """
     found = {}
     for name, values in others.items():
-        most = 3 if _OF_BASE.search(name.rpartition("/")[2]) else 2
+        most = 3 if is_of_base(name.rpartition("/")[2]) else 2
         if not 1 <= values.ndim <= most or values.dtype.kind not in "biuf" or not values.size:
             continue
         columns = values.reshape(len(values), -1).astype(np.float64)
@@ -143,11 +143,16 @@ def sides(name: str) -> set[str]:
     return {match.group().replace("_", "") for match in _SIDE.finditer(spaced)}
 
 
+def is_of_base(name: str) -> bool:
+    """Whether a name says where what carries the arm stands, which no joint tells."""
+    return bool(_OF_BASE.search(name)) and not _RATES.search(name)
+
+
 def may_move(name: str, width: int = 1) -> bool:
     """Whether an array of so many numbers a frame could be a part of the motion, by its name."""
     own = name.rpartition("/")[2]
-    if _OF_BASE.search(own) and not _RATES.search(own):
-        return True  # where the arm stands, which no joint tells
+    if is_of_base(own):
+        return True
     no_motion = says_no_position(own) or says_time(own) or MASK.fullmatch(own)
     return width <= _MOST_BESIDE and not no_motion and not _ELSE.search(name)
 

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import may_move, moves_beside
+from prior_reinforce.arm.recordings.beside import is_of_base, may_move, moves_beside
 from prior_reinforce.arm.recordings.bounds import check_names, check_numbers
 from prior_reinforce.arm.recordings.clock import Times
 from prior_reinforce.arm.recordings.naming import find_channels, vectors
@@ -192,7 +192,7 @@ def _numbers(topic: str, message: Any) -> Any:
         f"{topic}{'' if path == '/data' else path}": np.ravel(np.asarray(values, dtype=float))
         for path, values in _fields(message)
     }
-    other = says_no_position(topic.rpartition("/")[2])
+    other = says_no_position(topic.rpartition("/")[2]) and not is_of_base(topic)
     fields = {n: own for n, own in fields.items() if may_move(n, len(own)) and not other}
     names = [
         name if len(own) == 1 else f"{name}_{i}"
@@ -217,7 +217,8 @@ def _fields(message: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 def _moving(topic: str, messages: Sequence[Message]) -> dict[str, tuple[float, float]]:
     """The range of the only number, or list of numbers, of a topic that moves; none of several.
 
-    Several in one message are mostly a pose, or what a driver says of itself.
+    Several in one message are mostly a pose, or what a driver says of itself; but a base's pose is
+    named as one.
     """
     names = messages[0].content.name if messages else []
     rows = [m.content.position for m in messages]
@@ -229,6 +230,9 @@ def _moving(topic: str, messages: Sequence[Message]) -> dict[str, tuple[float, f
     groups |= {name: [i] for i, name in enumerate(names) if i not in grouped}
     fields = {name: np.array(rows)[:, group] for name, group in groups.items()}
     found = moves_beside(np.zeros((len(rows), 1)), fields, times)
+    if found and is_of_base(topic):
+        ends = np.array([*found.values()])
+        return {topic: (float(ends.min()), float(ends.max()))}
     return found if len(found) == 1 else {}
 
 
@@ -237,7 +241,8 @@ def _messages(reader: Any, connections: Sequence[Any]) -> list[Message]:
     found = []
     for c, stamp, raw in reader.messages(connections=connections):
         joints = c.msgtype in (_STATE, _TRAJECTORY)
-        if not joints and (len(raw) > _MOST_BYTES or _OF_NO_JOINT.search(c.msgtype)):
+        other = _OF_NO_JOINT.search(c.msgtype) and not is_of_base(c.topic)
+        if not joints and (len(raw) > _MOST_BYTES or other):
             return []
         content = _numbers(c.topic, reader.deserialize(raw, c.msgtype))
         found.append(Message(stamp, c.id, content))
