@@ -89,3 +89,6 @@ def test_a_number_may_stand_before_a_unit():
     assert factor("0.1mm", "m") == pytest.approx(1e-4)
     assert factor("0.01 bar", "rad") is None
     assert base_of("2 bar") == ("2 bar", 1.0)
+    assert factor("0.1 percent", "share") == pytest.approx(1e-3)
+    assert kind_of("0.01 deg") == "angle"
+    assert kind_of("2 bar") == "2 bar"

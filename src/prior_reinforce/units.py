@@ -99,7 +99,8 @@ SPELT = {
 """Unit by each of its spellings, in lower case."""
 
 
-_SCALED = re.compile(r"(\d*\.?\d+) *([^\d\s.].*)")
+_NUMBERED = re.compile(r"(\d*\.?\d+) *([^\d\s.].*)")
+"""A number before a unit: a motor's `0.01 deg`."""
 
 
 def spelt(text: str) -> str | None:
@@ -107,9 +108,20 @@ def spelt(text: str) -> str | None:
     return SPELT.get(text.lower())
 
 
+def without_number(unit: str) -> tuple[str, float]:
+    """Return a unit and the number before it: `deg` and 0.01 of `0.01 deg`, 1 where there is none.
+
+    What is no listed unit behind a number stays whole.
+    """
+    match = _NUMBERED.fullmatch(unit)
+    name = spelt(match[2]) if match else None
+    return (name, float(match[1])) if match and name else (unit, 1.0)
+
+
 def kind_of(unit: str) -> str:
     """Return what a unit measures; the unit itself if it is not listed."""
-    return UNITS[unit].kind if unit in UNITS else unit
+    name, _ = without_number(unit)
+    return UNITS[name].kind if name in UNITS else unit
 
 
 def units_of(kind: Kind) -> dict[str, float]:
@@ -118,25 +130,22 @@ def units_of(kind: Kind) -> dict[str, float]:
 
 
 def base_of(unit: str) -> tuple[str, float]:
-    """Return the base unit and the factor to it, rad and pi/180 for deg; other units stay.
-
-    A number may stand before a unit: a motor's `0.01 deg`.
-    """
-    known = UNITS.get(unit)
-    if known is None and (scaled := _SCALED.fullmatch(unit)) and spelt(scaled[2]):
-        base, scale = base_of(SPELT[scaled[2].lower()])
-        return base, float(scaled[1]) * scale
+    """Return the base unit and the factor to it, rad and pi/180 for deg; other units stay."""
+    name, number = without_number(unit)
+    known = UNITS.get(name)
     if known is None or known.kind == "share":
-        return unit, 1.0
-    return next(iter(units_of(known.kind))), known.factor
+        return name, number
+    return next(iter(units_of(known.kind))), number * known.factor
 
 
 def factor(unit: str, wanted: str) -> float | None:
     """Return what to multiply a number with, for another unit; None if that cannot be."""
-    if kind_of(unit) == kind_of(wanted) == "share":
-        return UNITS[unit].factor / UNITS[wanted].factor
     (here, of_one), (there, of_other) = base_of(unit), base_of(wanted)
-    return of_one / of_other if here == there else None
+    if kind_of(unit) == kind_of(wanted) == "share":
+        of_one, of_other = of_one * UNITS[here].factor, of_other * UNITS[there].factor
+    elif here != there:
+        return None
+    return of_one / of_other
 
 
 def spoken(unit: str) -> tuple[str, float]:

@@ -10,7 +10,6 @@ import re
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,9 +20,6 @@ from prior_reinforce.arm.recordings.units import SECONDS, Ambiguity, say_names
 from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.plans.signals import held_channels
 from prior_reinforce.plans.whole_turns import TURN
-
-if TYPE_CHECKING:
-    pass
 
 Arrays = Mapping[str, np.ndarray]
 _MOST_BESIDE = 64
@@ -151,9 +147,8 @@ def is_of_base(name: str) -> bool:
 def may_move(name: str, width: int = 1) -> bool:
     """Whether an array of so many numbers a frame could be a part of the motion, by its name."""
     own = name.rpartition("/")[2]
-    if is_of_base(own):
-        return True
-    no_motion = says_no_position(own) or says_time(own) or MASK.fullmatch(own)
+    other = (says_no_position(own) or says_time(own)) and not is_of_base(own)  # base_pose, base_T
+    no_motion = other or MASK.fullmatch(own)
     return width <= _MOST_BESIDE and not no_motion and not _ELSE.search(name)
 
 

@@ -9,13 +9,11 @@ from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, say_names, split_unit
 from prior_reinforce.arm.robots.limits import RobotLimits
 from prior_reinforce.errors import InvalidDemonstrationsError
-from prior_reinforce.units import factor
+from prior_reinforce.units import UNITS, factor
 
 _OFF = 0.01
 """By which a held joint may be off, in [m] and [rad]. Ours: a lift's play and its encoder's noise;
 at an arm's length 0.01 rad is as much."""
-_MOST = 7.0
-"""Largest number that may be in [m] or [rad]; more is in another unit. Ours, as `units` has it."""
 
 
 def check_held(recordings: Sequence[Recording], robot: RobotLimits | None) -> None:
@@ -33,7 +31,9 @@ def check_held(recordings: Sequence[Recording], robot: RobotLimits | None) -> No
         for recording in recordings:
             for column in [one for one in recording.beside if find_channels([joint], [one])]:
                 span, unit = recording.beside[column], split_unit(column, CHANNEL_UNITS)[1]
-                units = ["m", "rad"] if max(map(abs, span)) <= _MOST else CHANNEL_UNITS
+                units = (
+                    ["m", "rad"] if max(map(abs, span)) <= UNITS["rad"].largest else CHANNEL_UNITS
+                )
                 units = [unit] if unit else units
                 scales = [scale for u in units for b in ("m", "rad") if (scale := factor(u, b))]
                 if not any(all(abs(s * end - at) <= _OFF for end in span) for s in scales or [1.0]):

@@ -56,7 +56,7 @@ def odd_starts(
         moves = ranges[i] > _LEAST.get(unit, 0.0)
         if moves and gaps[cut - 1] > allowed and spread <= _WITHIN * gaps[cut - 1]:
             few, rest = sorted((below, above), key=lambda group: (len(group), max(group)))
-            if {*rest.tolist()} != {*range(n)} and {*few.tolist()} == {*range(n)}:
+            if {*few.tolist()} == {*range(n)}:
                 few, rest = rest, few
             here, there = (f"{np.median(starts[group, i]):.3g} {unit}" for group in (few, rest))
             yield (

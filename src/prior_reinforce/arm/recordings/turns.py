@@ -31,6 +31,7 @@ from prior_reinforce.plans.whole_turns import (
     other_euler_forms,
     other_form,
 )
+from prior_reinforce.units import without_number
 
 Channel = Float[np.ndarray, " T"]
 """An angle at T frames."""
@@ -75,7 +76,7 @@ def aligned(
     motions = [*np.array(shown), *(np.array(each.positions) for each in selection.recordings)]
     form = with_turns(PlanFormat(selection.names, selection.units, 1.0), limits)
     recorded = zip(selection.names, selection.recorded_units, strict=True)
-    degrees = {name for name, unit in recorded if unit == "deg"}
+    degrees = {name for name, unit in recorded if without_number(unit)[0] == "deg"}
     # `rx`, `ry`, `rz` are a rotation vector where they are in radians, and else Euler angles.
     euler = [{*g} for g in euler_angles(form.names, form.units) if degrees.issuperset(g)]
     told = [g for g in form.attitudes if {*g} in euler]
