@@ -11,7 +11,14 @@ from prior_reinforce.errors import InvalidFeedbackError
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.parsing import from_words, read_numbers, read_place, read_uncertain_place
 from prior_reinforce.readings import Reading
-from prior_reinforce.wording import error_example, say_place, say_reading, to_words
+from prior_reinforce.wording import (
+    error_example,
+    say_length,
+    say_place,
+    say_reading,
+    say_tolerance,
+    to_words,
+)
 
 METRES = OutcomeFormat.metres(2)
 MIXED = OutcomeFormat(("x", "t"), ("m", "s"))
@@ -441,7 +448,10 @@ def test_a_unit_of_the_task_s_own_is_read_as_it_is_printed(unit, goal, words, er
 
 
 def test_a_number_without_a_unit_is_printed_without_one():
-    assert say_place([7.0], OutcomeFormat(("pins",), ("1",))) == "pins 7"
+    form = OutcomeFormat(("pins",), ("1",), (1.0,))
+    assert say_place([7.0], form) == "pins 7"
+    assert from_words("2 high", form).said == "2 high (pins +2)"
+    assert (say_tolerance(form), say_length(2.5, form)) == ("1", "2.5")
 
 
 def test_the_sign_that_a_word_was_given_is_said_where_it_has_none_of_its_own():

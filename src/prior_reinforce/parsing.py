@@ -399,7 +399,7 @@ def _terms(
             raise InvalidFeedbackError(f"{text!r} names {twice} twice; give each direction once")
         terms[j] = _term(part, found, pair, form.units[j], form.outcome_dim)
         if invented and (size := terms[j].size) is not None:
-            meant = f"{form.names[j]} {terms[j].sign * size:+g} {form.units[j]}"
+            meant = f"{form.names[j]} {terms[j].sign * size:+g} {form.units[j]}".removesuffix(" 1")
             terms[j] = replace(terms[j], said=f"{terms[j].said} ({meant})")
     return terms
 
@@ -416,7 +416,7 @@ def _term(
     said = part
     if value and not found.get("unit") and not found.get("sd_unit"):
         range_, spread = f"{least}-" if least else "", f" +- {sd}" if sd else ""
-        said = f"{range_}{value}{spread} {bare_unit(unit)} {word}"
+        said = f"{range_}{value}{spread}" + f" {bare_unit(unit)}" * (unit != "1") + f" {word}"
     sign = -1.0 if pair is not None and word == pair[1] else 1.0
     return _Term(part, said, sign, *numbers)
 

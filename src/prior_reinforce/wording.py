@@ -140,7 +140,7 @@ def say_length(length: float, form: OutcomeFormat) -> str:
     units = form.units
     if set(units) == {"m"}:
         return f"{_centimetres(length)} cm"
-    unit = units[0] if len(set(units)) == 1 else ""
+    unit = units[0] if len(set(units)) == 1 and units[0] != "1" else ""
     return f"{float(f'{length:.3g}'):g} {unit}".strip()
 
 
@@ -167,7 +167,7 @@ def say_tolerance(form: OutcomeFormat) -> str:
     for value, unit in zip(form.tolerance, form.units, strict=True):
         # A round number of radians is no round number of degrees.
         said, scale = (unit, 1.0) if kind_of(unit) == "angle" else spoken(unit)
-        each.append(f"{value * scale:g} {said}")
+        each.append(f"{value * scale:g}" + f" {said}" * (said != "1"))
     if len(set(each)) > len(set(form.units)):
         each = [f"{name} {said}" for name, said in zip(form.names, each, strict=True)]
     return " and ".join(dict.fromkeys(each))

@@ -175,5 +175,6 @@ def test_a_base_that_moves_is_named_though_it_is_called_a_pose():
         "base_T": np.tile(np.eye(4), (len(S), 1, 1)) + S[:, None, None],
         "tcp_pose": np.column_stack([0.3 * S, S, S]),
         "base_velocity": np.gradient(S),
+        "base_camera": np.tile(S[:, None], 100),
     }
     assert {*moves_beside(Q, others, T)} == {"base_pose", "base_T"}

@@ -350,7 +350,9 @@ def test_rows_without_an_episode_are_of_none(tmp_path):
             for a, r in zip(t, q.tolist(), strict=True)
         ]
     (tmp_path / "log.csv").write_text("\n".join(lines))
-    assert [r.episode for r in read_recordings(tmp_path / "log.csv")] == ["0", "1"]
+    read = read_recordings(tmp_path / "log.csv")
+    assert [r.episode for r in read] == ["0", "1"]
+    assert f"{len(t)} rows left out, which are of no episode" in read[0].remarks
 
 
 def test_exponents_of_fortran_are_read(tmp_path):

@@ -86,9 +86,12 @@ def read(source: Path, options: ReadOptions) -> Episodes:
                 "or more"
             )
         column, names, guessed = _throws(table, path.stem, options, alone=len(paths) == 1)
-        for episode in sorted({*names} - {""} or {""}, key=natural_order):  # what is blank is none
+        rows = names.count("")
+        of_none = f"{rows} rows left out, which are of no episode"
+        remarks = (of_none,) * (0 < rows < len(names))
+        for episode in sorted({*names} - {""} or {""}, key=natural_order):
             own = table.rows([i for i, name in enumerate(names) if name == episode])
-            yield episode, partial(_episode, own, episode, options, column, guessed, said)
+            yield episode, partial(_episode, own, episode, options, column, guessed, said, remarks)
 
 
 def _throws(
@@ -153,6 +156,7 @@ def _episode(
     episode_column: int | None,
     guessed: tuple[Ambiguity, ...],
     above: dict[str, float],
+    said_of_all: tuple[str, ...],
 ) -> Recording:
     log = next((g for g in LOG_FORMATS if set(g.columns) <= set(table.names)), None)
     said, told = _names_in_cells(table, options)
@@ -168,7 +172,7 @@ def _episode(
         channels = found
     elif table.named and (keys := options.key or ((log.key,) if log else ())):
         channels, named = _by_key(table, keys, others, options.joints or ()), False
-    remarks = []
+    remarks = [*said_of_all]
     if log is not None:
         remarks.append(f"{log.name}: time in {log.time_unit}, motion is {log.key} (measured)")
     clock = clock_of_table(table, episode, times, options, above, log and log.time_unit)
