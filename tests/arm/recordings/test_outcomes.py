@@ -374,3 +374,11 @@ def test_a_table_with_a_column_for_each_episode_is_to_be_turned(tmp_path):
     path = table(tmp_path, "episode,throw_0,throw_1\nx [m],0.8,0.9\ny [m],0.1,-0.1\n")
     with pytest.raises(InvalidDemonstrationsError, match="exchange rows and columns"):
         check_rows(read_outcomes(path), ("throw_0", "throw_1"), ("throw_0", "throw_1"))
+
+
+@pytest.mark.parametrize("head", ["X,Y", "ahead,left", "x,y"])
+def test_other_columns_may_hold_anything(recording, tmp_path, head):
+    rows = [f"{row},good" for row in rows_of_outcomes()]
+    path = table(tmp_path, "\n".join([f"episode,{head},surface", *rows]))
+    result = import_demonstrations(recording, outcomes=path, outcome_names=("x", "y"))
+    np.testing.assert_allclose(result.demonstrations.outcomes_seen, list(OUTCOMES.values()))

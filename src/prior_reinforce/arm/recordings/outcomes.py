@@ -88,23 +88,14 @@ class Outcomes:
         Raises:
             InvalidDemonstrationsError: One is missing.
         """
-        at, signs, said, missing = list[int](), list[float](), list[str](), list[str]()
-        axes = axes_of(OutcomeFormat(tuple(names), ("m",) * len(names)))
-        for name, axis in zip(names, axes, strict=True):
-            words = PLACE_WORDS[axis] if axis < len(PLACE_WORDS) else ()
-            found = [(own, sign) for said_as, sign in zip((name, *words), (1, 1, -1), strict=False)
-                     for own in self.names if own.lower() == said_as.lower()]  # fmt: skip
-            if not found:
-                missing.append(name)
-                continue
-            own, sign = found[0]
+        columns = _columns_of(names, self.names)
+        missing = [name for name, found in columns.items() if not found]
+        for name, found in columns.items():
             if len(found) > 1:
                 raise InvalidDemonstrationsError(
-                    f"{self.where} has {' and '.join(one for one, _ in found)} for {name}: write "
-                    f"one column {name}"
+                    f"{self.where} has {' and '.join(self.names[i] for i, _ in found)} for {name}: "
+                    f"write one column {name}"
                 )
-            said += [f"{own} is {'-' * (sign < 0)}{name}"] * (own.lower() != name.lower())
-            at, signs = [*at, self.names.index(own)], [*signs, float(sign)]
         if missing:
             polar = ""
             if {*_RADII}.intersection(self.names) and {*_BEARINGS}.intersection(self.names):
@@ -114,9 +105,15 @@ class Outcomes:
                 f"{', '.join(self.names)}: rename or add it (x is ahead of the base, y to its left"
                 f"{polar})"
             )
+        at, signs = zip(*(found[0] for found in columns.values()), strict=True)
+        said = [
+            f"{self.names[i]} is {'-' * (sign < 0)}{name}"
+            for name, i, sign in zip(names, at, signs, strict=True)
+            if self.names[i].lower() != name.lower()
+        ]
         where = f"{self.where} ({', '.join(said)})" if said else self.where
         units = tuple(self.units[i] for i in at)
-        values = self.values[:, at] * np.array(signs)
+        values = self.values[:, list(at)] * np.array(signs, dtype=float)
         return replace(self, where=where, values=values, names=tuple(names), units=units)
 
     @classmethod
@@ -142,6 +139,17 @@ class Outcomes:
         values = np.array([*numbers.values()], dtype=np.float64).reshape(n, k)
         names = tuple(map(str, range(1, k + 1)))
         return cls(where, (*numbers,), values, np.zeros(n), names, (None,) * k, named=False)
+
+
+def _columns_of(names: Sequence[str], there: Sequence[str]) -> dict[str, list[tuple[int, int]]]:
+    """Columns that each component may be, with signs: by its name, or by where it counts up to."""
+    axes = axes_of(OutcomeFormat(tuple(names), ("m",) * len(names)))
+    found = {}
+    for name, axis in zip(names, axes, strict=True):
+        words = PLACE_WORDS[axis] if axis < len(PLACE_WORDS) else ()
+        signs = {name.lower(): 1} | dict(zip(words, (1, -1), strict=False))
+        found[name] = [(i, signs[n.lower()]) for i, n in enumerate(there) if n.lower() in signs]
+    return found
 
 
 def table_beside(places: Sequence[Path]) -> Path | None:
@@ -191,8 +199,11 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
         key = 0  # by its cells, whatever it is called
     other = (*_NOT_COMPONENTS, *EPISODE_COLUMNS)
     columns = [i for i, name in enumerate(lower) if i != key and name not in other]
-    if names is not None and set(names) <= {split[i][0] for i in columns}:
-        columns = [i for i in columns if split[i][0] in names]
+    meant = _columns_of(names or (), [split[i][0] for i in columns])
+    if meant and all(meant.values()):  # others may hold anything
+        own = {i for each in meant.values() for i, _ in each}
+        exact = {i for i in own if split[columns[i]][0] in meant}
+        columns = [columns[i] for i in sorted(exact if len(exact) == len(meant) else own)]
     kept = [split[i][0] for i in columns]
     spreads = [
         name
