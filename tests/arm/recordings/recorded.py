@@ -337,3 +337,18 @@ def takes(
     s = 0.5 + 0.5 * np.linspace(0, 1, 100)[:, None]
     every = enumerate(zip(ends, units or [()] * len(ends), strict=True))
     return [Recording(f"t{i}", t, s * np.array(end), names, units=u) for i, (end, u) in every]
+
+
+def table(tmp_path: Path, text: str) -> Path:
+    """A table of outcomes."""
+    path = tmp_path / "outcomes.csv"
+    path.write_text(text)
+    return path
+
+
+def rows_of_outcomes(scale=(1, 1), first=0, name="{}"):
+    """Lines of the throws' outcomes, in other units or numbered from another number."""
+    return [
+        f"{name.format(int(episode) + first)},{scale[0] * x:.6g},{scale[1] * y:.6g}"
+        for episode, (x, y) in OUTCOMES.items()
+    ]

@@ -12,19 +12,12 @@ from prior_reinforce.errors import (
     UnclearUnitsError,
 )
 from prior_reinforce.units import base_of
-from tests.arm.recordings.recorded import OUTCOMES, write_csv, write_outcomes
-
-
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory):
-    """Six CSV throws without outcomes; copy nothing into it."""
-    return write_csv(tmp_path_factory.mktemp("throws"))
-
-
-def table(tmp_path, text):
-    path = tmp_path / "outcomes.csv"
-    path.write_text(text)
-    return path
+from tests.arm.recordings.recorded import (
+    OUTCOMES,
+    rows_of_outcomes,
+    table,
+    write_outcomes,
+)
 
 
 def test_centimetres_that_nobody_names_are_refused_until_said(recording, tmp_path):
@@ -185,14 +178,6 @@ def test_a_column_may_end_in_inches_where_the_task_has_that_name(tmp_path):
     np.testing.assert_allclose(found.values, [[0.254], [0.3048]])
     assert found.units == ("m",)
     assert read_outcomes(tmp_path / "outcomes.csv").names == ("distance_in", "plug_in")
-
-
-def rows_of_outcomes(scale=(1, 1), first=0, name="{}"):
-    """Lines of the throws' outcomes, in other units or numbered from another number."""
-    return [
-        f"{name.format(int(episode) + first)},{scale[0] * x:.6g},{scale[1] * y:.6g}"
-        for episode, (x, y) in OUTCOMES.items()
-    ]
 
 
 @pytest.mark.parametrize("unit", ["mm", "cm"])

@@ -16,19 +16,13 @@ from prior_reinforce.errors import (
     FileFormatError,
     InvalidDemonstrationsError,
 )
-from tests.arm.recordings.recorded import OUTCOMES, write_csv, write_outcomes
-
-
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory):
-    """Six CSV throws without outcomes; copy nothing into it."""
-    return write_csv(tmp_path_factory.mktemp("throws"))
-
-
-def table(tmp_path, text):
-    path = tmp_path / "outcomes.csv"
-    path.write_text(text)
-    return path
+from tests.arm.recordings.recorded import (
+    OUTCOMES,
+    rows_of_outcomes,
+    table,
+    write_csv,
+    write_outcomes,
+)
 
 
 def test_without_outcomes_every_episode_is_named(recording):
@@ -259,14 +253,6 @@ def test_a_point_before_three_digits_between_semicolons_is_doubted(tmp_path, hea
 def test_what_is_written_otherwise_is_told_with_what_to_write(recording, tmp_path, text, says):
     with pytest.raises(FileFormatError, match=says):
         read_outcomes(table(tmp_path, text), ["x", "y"])
-
-
-def rows_of_outcomes(scale=(1, 1), first=0, name="{}"):
-    """Lines of the throws' outcomes, in other units or numbered from another number."""
-    return [
-        f"{name.format(int(episode) + first)},{scale[0] * x:.6g},{scale[1] * y:.6g}"
-        for episode, (x, y) in OUTCOMES.items()
-    ]
 
 
 @pytest.mark.parametrize("options", [{}, {"leave_out": ["0"]}])

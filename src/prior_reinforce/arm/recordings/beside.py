@@ -13,8 +13,9 @@ from itertools import combinations
 
 import numpy as np
 
+from prior_reinforce.arm.recordings.channels import measured_of
 from prior_reinforce.arm.recordings.clock import COUNTER, Times, says_time, tells_time
-from prior_reinforce.arm.recordings.naming import measured_of, vectors
+from prior_reinforce.arm.recordings.naming import vectors
 from prior_reinforce.arm.recordings.recording import Positions
 from prior_reinforce.arm.recordings.units import SECONDS, Ambiguity, say_names
 from prior_reinforce.arm.robots.limits import says_no_position

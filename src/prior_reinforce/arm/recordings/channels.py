@@ -77,6 +77,23 @@ _OF_PLACE = re.compile(
 )
 """What x, y and z are the place of: `tool_x`. Others may be joints: `hip_x`, `hip_y`."""
 _ENTRY = re.compile(r"(?P<group>.*?)[_\[ ]*(?P<part>[0-4][,_]?[0-4])\]?")
+_OPENING = re.compile(
+    r"(.*[^a-z])?(gripper|jaw|claw|finger)s?([ _./-]*(width|pos(ition)?|q(pos)?|opening|state|value"
+    r"|joint\d*))*",
+    re.IGNORECASE,
+)
+"""Names of a gripper's opening: the only one, `gripper_width`, is the plan's `gripper`."""
+_COMMANDED = re.compile(
+    r"(^|[^a-z])(cmd|command(ed)?|actions?|target|des(ired)?|ref(erence)?|goal|set(point)?|leader"
+    r"|soll)($|[^a-z])",
+    re.IGNORECASE,
+)
+_MEASURED = re.compile(
+    r"(^|[^a-z])(act(ual)?|meas(ured)?|real|state|curr(ent)?|ist|obs(ervation)?|feedback|follower)"
+    r"($|[^a-z])",
+    re.IGNORECASE,
+)
+"""Words of what was commanded, and of what was measured."""
 
 
 def kinds(names: Sequence[str]) -> tuple[Kind, ...]:
@@ -129,3 +146,19 @@ def _are_matrix(_: str, parts: set[str]) -> bool:
     """Three rows and columns or more, of which every entry is there."""
     rows, columns = ({part[k] for part in parts} for k in (0, -1))
     return min(len(rows), len(columns)) >= 3 and len(parts) == len(rows) * len(columns)
+
+
+def is_opening(name: str) -> bool:
+    """Whether a name is of how far a gripper is open: `gripper`, `robot0_gripper_qpos`."""
+    return _OPENING.fullmatch(name) is not None
+
+
+def measured_of(stems: Sequence[str]) -> str | None:
+    """Return the one of several readings of a motion that was measured; None if none says so."""
+    for left in (
+        [stem for stem in stems if not _COMMANDED.search(stem)],
+        [stem for stem in stems if _MEASURED.search(stem)],
+    ):
+        if len(left) == 1:
+            return left[0]
+    return None

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from prior_reinforce.arm.recordings.channels import is_opening
 from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, say_names, split_unit
 from prior_reinforce.arm.robots.limits import is_joint, says_no_position
 from prior_reinforce.errors import InvalidDemonstrationsError
@@ -20,23 +21,6 @@ _OF_POSITIONS = re.compile(
     r"(?<=.)([./\[]+(positions?|angle|value|q)\]?|_pos(ition)?)$", re.IGNORECASE
 )
 """What follows a joint's name where tools write the messages' fields: `/elbow/position`."""
-_OPENING = re.compile(
-    r"(.*[^a-z])?(gripper|jaw|claw|finger)s?([ _./-]*(width|pos(ition)?|q(pos)?|opening|state|value"
-    r"|joint\d*))*",
-    re.IGNORECASE,
-)
-"""Names of a gripper's opening: the only one, `gripper_width`, is the plan's `gripper`."""
-_COMMANDED = re.compile(
-    r"(^|[^a-z])(cmd|command(ed)?|actions?|target|des(ired)?|ref(erence)?|goal|set(point)?|leader"
-    r"|soll)($|[^a-z])",
-    re.IGNORECASE,
-)
-_MEASURED = re.compile(
-    r"(^|[^a-z])(act(ual)?|meas(ured)?|real|state|curr(ent)?|ist|obs(ervation)?|feedback|follower)"
-    r"($|[^a-z])",
-    re.IGNORECASE,
-)
-"""Words of what was commanded, and of what was measured."""
 Texts = Mapping[str, tuple[str, ...]]
 """Texts of a file, by what it calls them."""
 _DEEPEST = 12
@@ -83,17 +67,6 @@ def joint_vectors(names: Sequence[str], count: int) -> dict[str, list[int]]:
         for stem, group in vectors(names).items()
         if len(group) == count and not says_no_position(stem)
     }
-
-
-def measured_of(stems: Sequence[str]) -> str | None:
-    """Return the one of several readings of a motion that was measured; None if none says so."""
-    for left in (
-        [stem for stem in stems if not _COMMANDED.search(stem)],
-        [stem for stem in stems if _MEASURED.search(stem)],
-    ):
-        if len(left) == 1:
-            return left[0]
-    return None
 
 
 def numbered_like(joints: Sequence[str], there: Sequence[str]) -> tuple[str, ...] | None:
@@ -179,6 +152,6 @@ def _find(name: str, there: Sequence[str]) -> int | None:
             f"{say_names([there[i] for i in found])} all look like {name}; name the recorded ones "
             "with --joints"
         )
-    if not found and _OPENING.fullmatch(bare):
-        found = [i for i, other in enumerate(names) if _OPENING.fullmatch(other)]
+    if not found and is_opening(bare):
+        found = [i for i, other in enumerate(names) if is_opening(other)]
     return found[0] if len(found) == 1 else None

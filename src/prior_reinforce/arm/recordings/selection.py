@@ -9,12 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from prior_reinforce.arm.recordings.beside import columns_beside
-from prior_reinforce.arm.recordings.channels import Kind, kinds, one_for_all
+from prior_reinforce.arm.recordings.channels import Kind, kinds, measured_of, one_for_all
 from prior_reinforce.arm.recordings.judging import UNIT, Given, Judge, beliefs_of
 from prior_reinforce.arm.recordings.naming import (
     find_channels,
     joint_vectors,
-    measured_of,
     missing_channels,
     numbered_like,
 )
