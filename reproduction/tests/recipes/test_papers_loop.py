@@ -12,6 +12,7 @@ from reproduction.recipes.papers_loop import (
     FRAMES,
     GATE,
     KNOWN,
+    OTHERS,
     RECIPE,
     SPLINES,
     Executable,
@@ -30,7 +31,9 @@ def test_one_training_a_set_and_code_serves_everything():
     planned = units(Scale(device="cuda"))
     trainings = {unit.training for unit, _ in planned}
     assert {(t.generator, t.demonstrations) for t in trainings} == {
-        (generator, name) for generator in (FRAMES, SPLINES) for name in ("A", "B")
+        (generator, name)
+        for generator in (FRAMES, SPLINES, *OTHERS.values())
+        for name in ("A", "B")
     }
     assert {(t.perception, t.device) for t in trainings} == {("camera", "cuda")}
 

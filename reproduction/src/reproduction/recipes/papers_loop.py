@@ -3,7 +3,8 @@
 Outcomes of the demonstrations are read by a camera; each goal is known with an error as large as a
 camera's, drawn once; for every trial the network is sampled anew, and the paper's Gaussian process
 corrects the condition from what is seen by eye. Controls: goals known exactly; then one noise for
-all trials, or no adapter. The networks want a GPU: six minutes of an H100 for A and B at once.
+all trials, or no adapter. Whether fewer steps or a smaller network would do better is asked on V1.
+The networks want a GPU: six minutes of an H100 for A and B at once, and as long for the others.
 
 The paper does not say how its plans reach the arm, whose controllers are low-pass filters. Plans of
 the network's raw frames, smoothed ones, and ones of a network that learns spline control points are
@@ -38,6 +39,13 @@ from reproduction.statistics import SHARE
 FRAMES = "diffusion-paper,training_steps=20000"
 SPLINES = "diffusion-paper,training_steps=6000,representation=splines"
 """On spline control points; as many steps as there was time for on the GPU."""
+OTHERS = {
+    "2,500 steps": "diffusion-paper,training_steps=2500",
+    "5,000 steps": "diffusion-paper,training_steps=5000",
+    "10,000 steps": "diffusion-paper,training_steps=10000",
+    "widths 32, 64, 128": FRAMES + ",network.widths=32:64:128",
+}
+"""What is asked of raw frames: fewer steps at the paper's own size, and a smaller network."""
 _VARIANTS = {"V1": "basketball-v1", "V2": "basketball-v2", "V3": "basketball-v3"}
 LOOP, EXACT = "the paper's loop", "goals known exactly"
 ONE_NOISE, ALONE = f"{EXACT}, one noise for all trials", f"{EXACT}, no adapter"
@@ -112,39 +120,41 @@ def smoothed(generator: Generator, frames: float) -> Generator:
 
 
 def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
-    """Trials and plans of one training a set, of raw frames and of spline control points."""
+    """Trials and plans of one training a set and form of network."""
+    forms = {"frames": FRAMES, "splines": SPLINES}
+    forms |= {f"frames, {changed}": generator for changed, generator in OTHERS.items()}
     planned = list[Planned]()
-    for coded, generator in (("frames", FRAMES), ("splines", SPLINES)):
+    for form, generator in forms.items():
         for name in scale.sets:
             training = Training(
                 TASK, name, generator, scale.seeds[0], perception="camera", device=scale.device
             )
-            planned += _of_training(coded, training, scale)
+            planned += _of_training(form, training, scale)
     return planned
 
 
-def _of_training(coded: str, training: Training, scale: Scale) -> list[Planned]:
-    """The loop on variants of the hardware, its controls on V1; plans before the gate."""
+def _of_training(form: str, training: Training, scale: Scale) -> list[Planned]:
+    """The loop on V1, and its controls but for splines; of `frames` and `splines` more."""
 
     def tried(kind: type[Trials], adapter: str, variant: str, method: str) -> Planned:
         unit = scale.trials(training, adapter, "eye", task=_VARIANTS[variant])
-        told = {"condition": f"{variant}, by eye", "method": f"{coded}: {method}"}
+        told = {"condition": f"{variant}, by eye", "method": f"{form}: {method}"}
         return kind(**vars(unit)), told
 
-    raw = coded == "frames"
+    whole, splines = form == "frames", form == "splines"
     planned = [
         tried(PerceivedGoalTrials, "gp", variant, LOOP)
-        for variant in (_VARIANTS if raw else ["V1"])
+        for variant in (_VARIANTS if whole else ["V1"])
     ]
-    if raw:
+    if not splines:
         planned += [
             tried(FreshNoiseTrials, "gp", "V1", EXACT),
             tried(Trials, "gp", "V1", ONE_NOISE),
             tried(FreshNoiseTrials, "frozen", "V1", ALONE),
         ]
-    planned.append((ZeroShot(training), {"condition": KNOWN, "method": coded}))
-    for by in _SMOOTHINGS if raw else _SMOOTHINGS[:1]:
-        method = f"{coded}, smoothed by {1000 * by:.0f} ms" if by else coded
+    planned.append((ZeroShot(training), {"condition": KNOWN, "method": form}))
+    for by in _SMOOTHINGS if whole else _SMOOTHINGS[: int(splines)]:
+        method = f"{form}, smoothed by {1000 * by:.0f} ms" if by else form
         told = {"condition": GATE, "method": method}
         planned.append((Executable(training, scale.goals, by), told))
     return planned
