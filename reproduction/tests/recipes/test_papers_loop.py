@@ -9,11 +9,12 @@ from prior_reinforce.generators import make_generator
 from reproduction.evaluation import LearnedGenerator, Training
 from reproduction.recipes import Scale
 from reproduction.recipes.papers_loop import (
+    FEWER,
     FRAMES,
     GATE,
     KNOWN,
-    OTHERS,
     RECIPE,
+    SMALLER,
     SPLINES,
     Executable,
     PerceivedGoalTrials,

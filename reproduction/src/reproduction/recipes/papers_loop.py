@@ -39,13 +39,13 @@ from reproduction.statistics import SHARE
 FRAMES = "diffusion-paper,training_steps=20000"
 SPLINES = "diffusion-paper,training_steps=6000,representation=splines"
 """On spline control points; as many steps as there was time for on the GPU."""
-OTHERS = {
-    "2,500 steps": "diffusion-paper,training_steps=2500",
-    "5,000 steps": "diffusion-paper,training_steps=5000",
-    "10,000 steps": "diffusion-paper,training_steps=10000",
-    "widths 32, 64, 128": FRAMES + ",network.widths=32:64:128",
+FEWER = {
+    f"frames, {steps:,} steps": f"diffusion-paper,training_steps={steps}"
+    for steps in (2500, 5000, 10000)
 }
-"""What is asked of raw frames: fewer steps at the paper's own size, and a smaller network."""
+"""Raw frames at the paper's own size, learned in fewer steps."""
+SMALLER = {"frames, widths 32, 64, 128": FRAMES + ",network.widths=32:64:128"}
+"""Raw frames by a smaller network, which a core of a CPU learns in half an hour."""
 _VARIANTS = {"V1": "basketball-v1", "V2": "basketball-v2", "V3": "basketball-v3"}
 LOOP, EXACT = "the paper's loop", "goals known exactly"
 ONE_NOISE, ALONE = f"{EXACT}, one noise for all trials", f"{EXACT}, no adapter"
@@ -121,13 +121,13 @@ def smoothed(generator: Generator, frames: float) -> Generator:
 
 def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
     """Trials and plans of one training a set and form of network."""
-    forms = {"frames": FRAMES, "splines": SPLINES}
-    forms |= {f"frames, {changed}": generator for changed, generator in OTHERS.items()}
+    forms = {"frames": FRAMES, "splines": SPLINES} | FEWER | SMALLER
     planned = list[Planned]()
     for form, generator in forms.items():
+        device = "cpu" if form in SMALLER else scale.device
         for name in scale.sets:
             training = Training(
-                TASK, name, generator, scale.seeds[0], perception="camera", device=scale.device
+                TASK, name, generator, scale.seeds[0], perception="camera", device=device
             )
             planned += _of_training(form, training, scale)
     return planned
