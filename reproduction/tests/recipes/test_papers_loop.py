@@ -33,10 +33,11 @@ def test_one_training_a_set_and_code_serves_everything():
     trainings = {unit.training for unit, _ in planned}
     assert {(t.generator, t.demonstrations) for t in trainings} == {
         (generator, name)
-        for generator in (FRAMES, SPLINES, *OTHERS.values())
+        for generator in (FRAMES, SPLINES, *FEWER.values(), *SMALLER.values())
         for name in ("A", "B")
     }
-    assert {(t.perception, t.device) for t in trainings} == {("camera", "cuda")}
+    assert {t.perception for t in trainings} == {"camera"}
+    assert {t.generator for t in trainings if t.device == "cpu"} == set(SMALLER.values())
 
 
 @pytest.fixture(scope="module")
