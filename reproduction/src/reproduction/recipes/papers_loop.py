@@ -46,6 +46,7 @@ FEWER = {
 """Raw frames at the paper's own size, learned in fewer steps."""
 SMALLER = {"frames, widths 32, 64, 128": FRAMES + ",network.widths=32:64:128"}
 """Raw frames by a smaller network, which a core of a CPU learns in half an hour."""
+_OTHERS = FEWER | SMALLER
 _VARIANTS = {"V1": "basketball-v1", "V2": "basketball-v2", "V3": "basketball-v3"}
 LOOP, EXACT = "the paper's loop", "goals known exactly"
 ONE_NOISE, ALONE = f"{EXACT}, one noise for all trials", f"{EXACT}, no adapter"
@@ -121,7 +122,7 @@ def smoothed(generator: Generator, frames: float) -> Generator:
 
 def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
     """Trials and plans of one training a set and form of network."""
-    forms = {"frames": FRAMES, "splines": SPLINES} | FEWER | SMALLER
+    forms = {"frames": FRAMES, "splines": SPLINES} | _OTHERS
     planned = list[Planned]()
     for form, generator in forms.items():
         device = "cpu" if form in SMALLER else scale.device
@@ -161,19 +162,20 @@ def _of_training(form: str, training: Training, scale: Scale) -> list[Planned]:
 
 
 def table(results: Results) -> Table:
-    """One row a form and what was changed: trials on each variant, first trials and more on V1."""
+    """Of `frames` and `splines`, a row for each change: trials on each variant, more on V1."""
     on_v1 = _VARIANTS["V1"]
     columns: Columns = {
         **{label: mean_of(TRIALS, task=task) for label, task in _VARIANTS.items()},
         "V1, first trials": mean_of(FIRST, task=on_v1),
         "V1, within 4": mean_of(reached(4), task=on_v1),
     }
-    looped = results.having("failed_readings")
-    return Table.of(("trials to a goal",), looped.by("method"), columns)
+    looped = results.having("failed_readings").by("method")
+    shown = {name: rows for name, rows in looped.items() if name.partition(":")[0] not in _OTHERS}
+    return Table.of(("trials to a goal",), shown, columns)
 
 
 def remarks(results: Results) -> list[str]:
-    """How well each form knows its demonstrations, and which of its plans the gate lets pass."""
+    """How well each form knows its demonstrations, trials of others, plans the gate lets pass."""
     off = [
         f"{form} {1000 * rows.where(quantity='own_rms_rad').frame['value'].mean():.1f} mrad"
         for form, rows in results.where(condition=KNOWN).by("method").items()
@@ -182,7 +184,15 @@ def remarks(results: Results) -> list[str]:
         f"{plans} {rows.mean(column('passed', SHARE)).value:.2f} and {rows.mean(FIRST).value:.2f}"
         for plans, rows in results.where(condition=GATE).by("method").items()
     ]
+    on_v1 = results.where(task=_VARIANTS["V1"]).having("failed_readings").by("method")
+    others = [
+        " ".join([form, *(str(on_v1[f"{form}: {of}"].mean(TRIALS)) for of in (LOOP, ONE_NOISE))])
+        for form in _OTHERS
+        if f"{form}: {ONE_NOISE}" in on_v1
+    ]
     said = [f"Off its own demonstrations (rms): {'; '.join(off)}."] if off else []
+    if others:
+        said.append(f"Trials on V1, the paper's loop and one noise: {'; '.join(others)}.")
     if gate:
         said.append(f"Plans that the Panda's gate lets pass, and hits: {'; '.join(gate)}.")
     return said
