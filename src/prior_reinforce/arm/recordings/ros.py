@@ -33,6 +33,7 @@ from prior_reinforce.arm.recordings.recording import (
     recorded,
     unread,
 )
+from prior_reinforce.arm.recordings.trajectories import read_trajectory
 from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.errors import ConfigurationError, FileFormatError
@@ -414,9 +415,4 @@ def _clock_of(
 
 def _trajectory(bag: Path, episode: str, message: Any, options: ReadOptions) -> Recording:
     with named_damage(bag, _BAG):
-        times = [p.time_from_start.sec + p.time_from_start.nanosec * 1e-9 for p in message.points]
-        positions = np.array([p.positions for p in message.points], dtype=np.float64)
-        positions = positions.reshape(len(times), -1)
-        stamps, name = np.array(times), "time_from_start"
-        clock = options.clock(episode, len(times), stamps=stamps, name=name, unit="s")
-        return recorded(episode, clock, positions, tuple(message.joint_names))
+        return read_trajectory(bag, episode, message, options)
