@@ -185,7 +185,7 @@ def draw(results: Results, folder: Path) -> list[Picture]:
         "Each arrow leads from the goal that was asked for to where the throw landed, without any "
         "trial; the colour is how far that is. Yellow: where the demonstrations landed. Dashed: "
         f"the reachable region, seen from behind the robot. Prior set {one['set']}, seed "
-        f"{one['seed']}."
+        f"{one['seed']:g}."
     )
     return [Picture(path, caption)]
 

@@ -40,11 +40,10 @@ FRAMES = "diffusion-paper,training_steps=20000"
 SPLINES = "diffusion-paper,training_steps=6000,representation=splines"
 """On spline control points; as many steps as there was time for on the GPU."""
 FEWER = {
-    f"frames, {steps:,} steps": f"diffusion-paper,training_steps={steps}"
-    for steps in (2500, 5000, 10000)
+    f"{steps:,} steps": f"diffusion-paper,training_steps={steps}" for steps in (2500, 5000, 10000)
 }
 """Raw frames at the paper's own size, learned in fewer steps."""
-SMALLER = {"frames, widths 32, 64, 128": FRAMES + ",network.widths=32:64:128"}
+SMALLER = {"widths 32, 64, 128": FRAMES + ",network.widths=32:64:128"}
 """Raw frames by a smaller network, which a core of a CPU learns in half an hour."""
 _OTHERS = FEWER | SMALLER
 _VARIANTS = {"V1": "basketball-v1", "V2": "basketball-v2", "V3": "basketball-v3"}
@@ -177,7 +176,7 @@ def table(results: Results) -> Table:
 def remarks(results: Results) -> list[str]:
     """How well each form knows its demonstrations, trials of others, plans the gate lets pass."""
     off = [
-        f"{form} {1000 * rows.where(quantity='own_rms_rad').frame['value'].mean():.1f} mrad"
+        f"{form} {1000 * rows.where(quantity='own_rms_rad').frame['value'].mean():.1f}"
         for form, rows in results.where(condition=KNOWN).by("method").items()
     ]
     gate = [
@@ -190,7 +189,7 @@ def remarks(results: Results) -> list[str]:
         for form in _OTHERS
         if f"{form}: {ONE_NOISE}" in on_v1
     ]
-    said = [f"Off its own demonstrations (rms): {'; '.join(off)}."] if off else []
+    said = [f"Off its own demonstrations, rms in mrad: {'; '.join(off)}."] if off else []
     if others:
         said.append(f"Trials on V1, the paper's loop and one noise: {'; '.join(others)}.")
     if gate:

@@ -184,8 +184,6 @@ def draw(results: Results, folder: Path) -> list[Picture]:
         "deviation), the paper's and ours by its procedure. Narrow ones: how far the mean is "
         "known (95 % interval over sets and goals)."
     )
-    if not results.where(perception=CAMERA).empty:
-        caption += " The camera finds objects by colour; its rows are no evidence about VLMs."
     return [Picture(path, caption)]
 
 
