@@ -5,12 +5,7 @@ import pytest
 
 from prior_reinforce.arm.recordings.stated import frames_said, names_said, units_said, with_rate
 from prior_reinforce.errors import FileFormatError
-
-T = np.arange(101) / 50
-S = np.clip((T - 0.3) / 1.2, 0, 1)
-S = 10 * S**3 - 15 * S**4 + 6 * S**5
-Q = np.array([0.1, -0.6, 0.2]) + S[:, None] * [0.3, 0.4, -0.2]
-UR = ("pan", "lift", "elbow")
+from tests.arm.recordings.recorded import UR, Q
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import MASK, Arrays, moves_beside
+from prior_reinforce.arm.recordings.beside import MASK, Arrays, arrays_beside
 from prior_reinforce.arm.recordings.bounds import check_names
 from prior_reinforce.arm.recordings.channels import Kind, kinds, one_for_all
 from prior_reinforce.arm.recordings.clock import (
@@ -81,12 +81,7 @@ def recorded_among(
         clock = clock_among(where, episode, kept, arrays, options, declared)
     others = {name: array for name, array in arrays.items() if name not in keys}
     called = (*keys, *(names or known))
-    more = {"left_out": moves_beside(positions, others, clock.times, called)} | more
-    more["beside"] = {
-        name: (float(np.nanmin(own)), float(np.nanmax(own)))
-        for name, own in others.items()
-        if own.ndim == 1 and own.dtype.kind in "biuf" and np.any(np.isfinite(own))
-    }
+    more["beside"] = arrays_beside(positions, others, clock.times, called)
     more["remarks"] = (*more.get("remarks", ()), *why)
     if not bare:
         unclear = _other_names(episode, texts, positions.shape[1], options.joints or ())
