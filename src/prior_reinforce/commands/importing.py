@@ -12,25 +12,21 @@ from typing import Annotated, Literal
 import tyro
 
 from prior_reinforce.arm.recordings import (
-    Inspection,
     Preprocessing,
     ReadOptions,
     Recordings,
+    Wanted,
     inspect,
     read,
 )
-from prior_reinforce.arm.recordings.outcome_units import in_units
 from prior_reinforce.arm.recordings.outcomes import (
     OUTCOMES_FILE,
-    Outcomes,
     missing_outcomes,
     table_beside,
     write_outcome_table,
 )
 from prior_reinforce.arm.recordings.selection import Selection
-from prior_reinforce.arm.recordings.starts import check_outcomes
 from prior_reinforce.arm.recordings.units import Ambiguity, raise_if_ambiguous
-from prior_reinforce.arm.workspace.manifest import UNKNOWN, Manifest
 from prior_reinforce.arm.workspace.view import InspectView
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.commands import warn
@@ -106,37 +102,43 @@ class Import(OnWorkspace):
 
     def read_into(self, workspace: Workspace, source: Path) -> None:
         """Read recordings, and take them in or say what would be."""
-        form = workspace.manifest.format
-        is_known = form.names != UNKNOWN
-        joints = self.options.joints or (form.names if is_known else None)
+        how = Preprocessing(None, self.horizon, self.trim, self.smooth)
+        wanted = workspace.wanted(how, append=self.append)
         try:
             try:
-                recordings = read(source, replace(self.options, joints=joints))
-                selection = recordings.select(*((form.names, form.units) if is_known else ()))
+                options = replace(self.options, joints=self.options.joints or wanted.names)
+                recordings = read(source, options)
+                selection = recordings.select(wanted)
                 unclear = recordings.ambiguities + selection.ambiguities
             except InvalidDemonstrationsError as error:
-                if not self.inspect or self.options.joints is not None or not is_known:
+                if not self.inspect or self.options.joints is not None or not wanted.names:
                     raise
                 recordings = read(source, self.options)  # what is there, by its own names
-                selection = recordings.select()
+                selection = recordings.select(replace(wanted, names=None, plan_units=None))
                 unclear = (*recordings.ambiguities, Ambiguity(str(error), "--joints COLUMN ..."))
             if self.options.joints is not None:  # said, though they are the plan's own
                 unclear = tuple(one for one in unclear if not one.option.startswith("--joints"))
             if self.inspect:
-                self._inspect(workspace, recordings, selection, unclear)
+                self._inspect(wanted, recordings, selection, unclear)
             else:
-                self._import(workspace, recordings, selection, unclear)
+                self._import(workspace, wanted, recordings, selection, unclear)
         except UnclearUnitsError as error:
             also = f"{error.also}; and " if error.also else ""
             command = self._command(error.options)
             raise ConfigurationError(f"{also}{error.what}; if so: {command}") from error
 
     def _import(
-        self, workspace: Workspace, recordings: Recordings, selection: Selection, unclear: Unclear
+        self,
+        workspace: Workspace,
+        wanted: Wanted,
+        recordings: Recordings,
+        selection: Selection,
+        unclear: Unclear,
     ) -> None:
-        manifest, at_terminal = workspace.manifest, sys.stdin.isatty()
-        form = manifest.outcome_format
-        known, more = self._known(manifest, recordings, unclear, may_lack=at_terminal)
+        form, at_terminal = workspace.manifest.outcome_format, sys.stdin.isatty()
+        known, more = recordings.outcomes(
+            wanted, self.outcomes, self.outcome_unit, unclear=unclear, may_lack=at_terminal
+        )
         _settle(unclear + more, at_terminal=at_terminal)
         if at_terminal:
             source = recordings.source
@@ -149,9 +151,7 @@ class Import(OnWorkspace):
                 selection = selection.without(missing_outcomes(selection.episodes, answers))
                 if not selection.recordings:
                     raise InvalidDemonstrationsError("no episode is left; import again")
-        check_outcomes(selection, known)  # before the work of the next line
-        inspection = self._inspected(workspace, selection)
-        result = recordings.demonstrations(inspection, known, form, declared=manifest.declared)
+        result = recordings.demonstrations(selection, known, wanted)
         print_checked(result.preview.text)
         n_before = workspace.take_in(result, str(recordings.source), append=self.append)
         if n_before:
@@ -166,19 +166,20 @@ class Import(OnWorkspace):
             with suppress(OSError):
                 picture.unlink()
             warn(f"no picture: {error}")
-        if inspection.remedy:
-            print(f"next: {self._command(inspection.remedy)}")
+        if remedy := result.preview.inspection.remedy:
+            print(f"next: {self._command(remedy)}")
         else:
             print_next(workspace)
 
     def _inspect(
-        self, workspace: Workspace, recordings: Recordings, selection: Selection, unclear: Unclear
+        self, wanted: Wanted, recordings: Recordings, selection: Selection, unclear: Unclear
     ) -> None:
-        manifest = workspace.manifest
-        found = replace(self._inspected(workspace, selection), ambiguities=unclear)
+        found = replace(inspect(selection, wanted), ambiguities=unclear)
         places, episodes = recordings.outcome_places, selection.episodes
         table = self.outcomes or table_beside(places)
-        known, more = self._known(manifest, recordings, unclear, may_lack=True)
+        known, more = recordings.outcomes(
+            wanted, self.outcomes, self.outcome_unit, unclear=unclear, may_lack=True
+        )
         missing: list[str] = []
         if table is not None:
             missing = missing_outcomes(episodes, known)
@@ -188,9 +189,9 @@ class Import(OnWorkspace):
         else:
             table, missing = places[0] / OUTCOMES_FILE, [*episodes]
             rows: dict[str, tuple[object, ...]] = dict.fromkeys(episodes, ())
-            outcome = workspace.manifest.outcome_format
+            names, units = wanted.outcome_names or (), wanted.outcome_units or ()
             with named_disk_errors(places[0]):
-                write_outcome_table(table, rows, outcome.names, outcome.units)
+                write_outcome_table(table, rows, names, units)
             said = f"none yet; fill in {table} (units are in its first line)"
         options = " ".join(dict.fromkeys(one.option for one in unclear + more))
         command = self._command(options, found.remedy)
@@ -221,25 +222,6 @@ class Import(OnWorkspace):
         kept = [option for option in given if option.split()[0] not in more.split()]
         said = ["prior-reinforce import", shlex.join(self.words), *kept, more]
         return " ".join(filter(None, said))
-
-    def _inspected(self, workspace: Workspace, selection: Selection) -> Inspection:
-        """What becomes of recordings, as they are trimmed and resampled here."""
-        manifest = workspace.manifest
-        how = Preprocessing(manifest.format.dt, self.horizon, self.trim, self.smooth)
-        before = workspace.demonstrations if self.append else None
-        return inspect(selection, how, manifest.robot, manifest.gate, before)
-
-    def _known(
-        self, manifest: Manifest, recordings: Recordings, unclear: Unclear, *, may_lack: bool
-    ) -> tuple[Outcomes, Unclear]:
-        """The outcomes of a table or the recordings, in the manifest's units."""
-        names = manifest.outcome_format.names
-        try:
-            found = recordings.outcomes(self.outcomes, names, may_lack=may_lack)
-        except InvalidDemonstrationsError as missing:
-            raise_if_ambiguous(unclear, also=str(missing))
-            raise
-        return in_units(found, manifest.outcome_format.units, self.outcome_unit)
 
 
 def _settle(ambiguities: Unclear, *, at_terminal: bool) -> None:

@@ -29,6 +29,14 @@ AFTER = 0.4
 """Still time after each throw, [s]."""
 HOME = np.array([0.0, -0.4, 0.1, -2.0, 0.0, 1.8, 0.8])
 SWING = np.array([0.1, 0.4, 0.0, 0.8, -0.1, 0.9, 0.0])
+T = np.arange(101) / 50
+"""Times of a swing of three joints, [s]."""
+S = 10 * (s := np.clip((T - 0.3) / 1.2, 0, 1)) ** 3 - 15 * s**4 + 6 * s**5
+"""How far it is along, from 0 to 1."""
+Q = np.array([0.1, -0.6, 0.2]) + S[:, None] * [0.3, 0.4, -0.2]
+"""Its joints, [rad]."""
+UR = ("pan", "lift", "elbow")
+"""Their names."""
 OUTCOMES = {str(i): (0.8 + 0.05 * i, 0.1 * (-1) ** i + 0.01 * i) for i in range(N)}
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.arm.recordings.appending import appended, check_scale
-from prior_reinforce.arm.recordings.inspection import inspect
+from prior_reinforce.arm.recordings.inspection import Wanted, inspect
 from prior_reinforce.arm.recordings.preprocessing import Preprocessing
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.selection import Selection
@@ -45,7 +45,8 @@ def selection(names, unit, motion):
 
 
 def joined(before, more, robot=None):
-    found = inspect(more, Preprocessing(0.02, trim=False), robot, before=before)
+    how = Preprocessing(0.02, trim=False)
+    found = inspect(more, Wanted(preprocessing=how, robot=robot, before=before))
     form = before.format
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -5,35 +5,18 @@ import pytest
 
 from prior_reinforce.arm.recordings import read_recordings
 from prior_reinforce.arm.recordings.beside import (
+    arrays_beside,
     columns_beside,
     is_clock,
-    moves_beside,
     twin_vectors,
 )
-from prior_reinforce.arm.recordings.naming import words
 from prior_reinforce.errors import UnclearUnitsError
-from tests.arm.recordings.recorded import sampled
-
-T = np.arange(101) / 50
-S = np.clip((T - 0.3) / 1.2, 0, 1)
-S = 10 * S**3 - 15 * S**4 + 6 * S**5
-Q = np.array([0.1, -0.6, 0.2]) + S[:, None] * [0.3, 0.4, -0.2]
-UR = ("pan", "lift", "elbow")
+from tests.arm.recordings.recorded import UR, Q, S, T, sampled
 
 
-@pytest.mark.parametrize(
-    "said",
-    [
-        "['pan', 'lift', 'elbow']",
-        '["pan", "lift", "elbow"]',
-        "pan lift elbow",
-        np.array(UR),
-        np.array([b"pan", b"lift", b"elbow"], dtype=object),
-    ],
-)
-def test_a_list_of_texts_in_any_form(said):
-    assert words(said) == UR
-    assert words(np.arange(3)) == ()
+def moving(beside):
+    """What moves, by what it is called."""
+    return {own.moving for own in beside.values()} - {""}
 
 
 LATE = Q[np.maximum(np.arange(101) - 4, 0)]
@@ -64,7 +47,7 @@ LATE = Q[np.maximum(np.arange(101) - 4, 0)]
     ],
 )
 def test_what_moves_beside_is_told_by_its_numbers(name, values, moves):
-    assert ([*moves_beside(Q, {name: values}, T)] == [name]) == moves
+    assert (moving(arrays_beside(Q, {name: values}, T)) == {name}) == moves
 
 
 SWUNG = Q[0] + 0.9 * (Q - Q[0])
@@ -91,7 +74,7 @@ SWUNG = Q[0] + 0.9 * (Q - Q[0])
     ],
 )
 def test_another_arm_in_parallel_is_no_command(motion, name, values, moves):
-    assert bool(moves_beside(Q, {name: values}, T, [motion])) == moves
+    assert bool(moving(arrays_beside(Q, {name: values}, T, [motion]))) == moves
 
 
 @pytest.mark.parametrize(
@@ -108,7 +91,7 @@ def test_another_arm_in_parallel_is_no_command(motion, name, values, moves):
     ],
 )
 def test_what_moves_at_a_rate_of_its_own_is_named(others, moves):
-    found = moves_beside(Q, others, T)
+    found = moving(arrays_beside(Q, others, T))
     assert bool(found) == moves
     assert not moves or all(f"({len(next(iter(others.values())))} frames" in name for name in found)
 
@@ -116,7 +99,7 @@ def test_what_moves_at_a_rate_of_its_own_is_named(others, moves):
 def test_numbered_columns_beside_are_one_group():
     names = [*UR, *(f"{stem}_{i}" for stem in ("left", "target") for i in range(3))]
     values = np.column_stack([Q, -Q, Q + 0.001])
-    assert [*columns_beside(names, values, range(3), T)] == ["left_0 to left_2"]
+    assert moving(columns_beside(names, values, range(3), T)) == {"left_0 to left_2"}
 
 
 @pytest.mark.parametrize(
@@ -177,4 +160,7 @@ def test_a_base_that_moves_is_named_though_it_is_called_a_pose():
         "base_velocity": np.gradient(S),
         "base_camera": np.tile(S[:, None], 100),
     }
-    assert {*moves_beside(Q, others, T)} == {"base_pose", "base_T"}
+    named = {f"base_pose[{i}]" for i in range(3)} | {f"base_T[{i}]" for i in range(16)}
+    found = arrays_beside(Q, others, T)
+    assert moving(found) == named
+    assert found["base_pose[0]"][:2] == (0.0, pytest.approx(0.3))

@@ -183,3 +183,29 @@ def test_times_that_are_no_numbers_are_left_to_the_recording():
     clock = clock_of("a", 3, stamps=np.array([0.0, np.inf, np.inf]), name="t")
     assert clock.ambiguities == ()
     np.testing.assert_array_equal(clock.times, [0, np.inf, np.inf])
+
+
+@pytest.mark.parametrize(
+    ("stated", "given", "rate"),
+    [
+        ({"meta.fps": 50}, None, ("fps", 50)),
+        ({"meta.frame_rate": 50}, None, ("frame_rate", 50)),
+        ({"meta.timing.dt_ms": 20.0}, None, ("dt_ms", 50.0)),
+        ({"meta.fps": 50, "rate": np.array(50.0)}, None, ("rate", 50.0)),
+        ({"meta.fps": 50, "meta.camera.fps": 30}, None, ("fps", 50)),
+        ({"meta.fps": 50, "meta.robot.hz": 100}, 50.0, ("fps", 50)),
+        ({"meta.version": 2}, None, ()),
+    ],
+)
+def test_a_rate_deep_in_what_a_file_says_is_its_rate(stated, given, rate):
+    assert tuple(declared_rate("a.npz", stated, given).values()) == rate
+
+
+def test_two_rates_that_contradict_each_other_are_refused():
+    stated = {"meta.fps": 50, "meta.robot.dt": 0.01}
+    with pytest.raises(
+        FileFormatError, match=r"meta\.fps says 50 .*, but meta\.robot\.dt 100; .*-r"
+    ):
+        declared_rate("a.npz", stated)
+    with pytest.raises(FileFormatError, match=r"rate says 20 .*, but meta\.fps 50"):
+        declared_rate("a.npz", {"rate": np.array(20), "meta.fps": 50})

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
+from prior_reinforce.arm.recordings.beside import moving_beside
 from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
@@ -276,7 +277,7 @@ def test_names_in_cells_are_those_of_the_numbers_beside(tmp_path, form):
         assert [n for n in recording.names if n in JOINTS] == [
             *(JOINTS if "joints" in how else said)
         ]
-        assert not recording.left_out
+        assert not moving_beside([recording])
     wanted = read_recordings(tmp_path, joints=JOINTS)[0]
     np.testing.assert_allclose(wanted.positions, q[:, ::-1], atol=1e-6)
     lines = path.read_text().splitlines()
@@ -295,7 +296,7 @@ def test_gaps_and_switches_beside_the_joints_are_named(tmp_path):
     ]
     (tmp_path / "a.csv").write_text("\n".join(["t,a,b,gripper,vacuum,frame_id", *rows]))
     (recording,) = read_recordings(tmp_path, joints=["a", "b"])
-    assert [*recording.left_out] == ["gripper"]
+    assert [*moving_beside([recording])] == ["gripper"]
     assert recording.remarks == ("vacuum left out, which holds no number",)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
+from prior_reinforce.arm.recordings.beside import moving_beside
 from prior_reinforce.errors import FileFormatError
 from tests.arm.recordings.recorded import (
     AS_IS,
@@ -201,7 +202,7 @@ def test_what_moves_is_named_by_what_it_is_and_not_by_a_word_in_its_path(tmp_pat
     path = one(tmp_path, arrays, {})
     (recording,) = read_recordings(path, key="observation/robot_state/joint_positions", rate=20)
     named = {"obs/gripper_states", "observation/robot_state/gripper_position"}
-    assert {*recording.left_out} == named
+    assert {*moving_beside([recording])} == named
 
 
 def test_a_json_in_an_attribute_names_the_joints_and_the_rate(tmp_path):
@@ -219,7 +220,7 @@ def test_what_moves_at_a_rate_of_its_own_is_named(tmp_path):
         file["gripper/width"] = 80 + 100 * sampled(0, 20)[1][:, 1]
         file["home"] = sampled(0, 50)[1][0]
     (recording,) = read_recordings(tmp_path / "throw.hdf5", rate=50)
-    assert [*recording.left_out] == ["gripper/width (35 frames, beside 86)"]
+    assert [*moving_beside([recording])] == ["gripper/width (35 frames, beside 86)"]
 
 
 def test_an_array_a_joint_is_found_by_its_path(tmp_path):

@@ -12,8 +12,10 @@ from prior_reinforce.arm.recordings.naming import (
     numbered_like,
     said_in,
     vectors,
+    words,
 )
 from prior_reinforce.errors import InvalidDemonstrationsError
+from tests.arm.recordings.recorded import UR
 
 
 @pytest.mark.parametrize(
@@ -140,3 +142,18 @@ def test_numbers_are_found_and_what_cannot_be_parsed_is_none():
 )
 def test_the_only_opening_of_a_gripper_is_the_gripper(there, found):
     assert find_channels(("joint1", "gripper"), there) == found
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "['pan', 'lift', 'elbow']",
+        '["pan", "lift", "elbow"]',
+        "pan lift elbow",
+        np.array(UR),
+        np.array([b"pan", b"lift", b"elbow"], dtype=object),
+    ],
+)
+def test_a_list_of_texts_in_any_form(said):
+    assert words(said) == UR
+    assert words(np.arange(3)) == ()

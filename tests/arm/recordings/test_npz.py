@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
+from prior_reinforce.arm.recordings.beside import moving_beside
 from prior_reinforce.arm.recordings.selection import select
 from prior_reinforce.arm.robots.plan_files import write_plan
 from prior_reinforce.errors import FileFormatError, PriorReinforceError, UnclearUnitsError
@@ -175,7 +176,7 @@ def test_a_second_arm_and_a_hand_are_named_and_commands_are_not(tmp_path):
     t, q = sampled(0, 50)
     hand = (q[:, 1] - q[0, 1])[:, None] * np.linspace(0.1, 0.9, 16)
     np.savez(tmp_path / "a.npz", t=t, q_right=q, q_left=0.5 * q[:, ::-1], hand=hand, q_cmd=q + 0.01)
-    assert [*read_recordings(tmp_path, key="q_right")[0].left_out] == ["q_left", "hand"]
+    assert [*moving_beside([read_recordings(tmp_path, key="q_right")[0]])] == ["q_left", "hand"]
 
 
 def test_names_of_some_columns_are_asked_about_in_the_files_order(tmp_path):
@@ -214,7 +215,7 @@ def test_a_gripper_at_a_rate_of_its_own_is_named_and_what_to_do_about_it(tmp_pat
     t, q = sampled(0, 100)
     np.savez(tmp_path / "a.npz", t=t, q=q, t_gripper=t[::5], gripper=80 - 100 * q[::5, 1])
     (recording,) = read_recordings(tmp_path / "a.npz")
-    assert [*recording.left_out] == [f"gripper ({len(t[::5])} frames, beside {len(t)})"]
+    assert [*moving_beside([recording])] == [f"gripper ({len(t[::5])} frames, beside {len(t)})"]
     with pytest.raises(
         FileFormatError, match=r"gripper has \d+; .* at the times of q: numpy\.interp"
     ):

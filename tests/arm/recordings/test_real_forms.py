@@ -13,6 +13,7 @@ import pytest
 import zarr
 
 from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
+from prior_reinforce.arm.recordings.beside import moving_beside
 from prior_reinforce.arm.robots import robot_limits
 from prior_reinforce.errors import (
     FileFormatError,
@@ -464,10 +465,10 @@ def test_a_gripper_in_another_array_is_named_and_can_be_taken(tmp_path):
         how = {} if source == "a.npz" else {"rate": 50}
         path = tmp_path / source
         (alone,) = read_recordings(path, key=[key], **how)
-        assert [*alone.left_out] == [beside]
+        assert [*moving_beside([alone])] == [beside]
         (both,) = read_recordings(path, key=[key, beside], **how)
         assert np.ptp(both.positions[:, 7]) == 1.0
-        assert not both.left_out
+        assert not moving_beside([both])
 
 
 @pytest.mark.parametrize("name", ["a.csv", "a.npz", "a.hdf5", "a.bag"])

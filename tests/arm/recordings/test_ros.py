@@ -12,6 +12,7 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
+from prior_reinforce.arm.recordings.beside import moving_beside
 from prior_reinforce.errors import FileFormatError
 from tests.arm.recordings.recorded import (
     AS_IS,
@@ -244,7 +245,7 @@ def with_lift(path, kind, say):
 def test_a_lift_in_messages_of_any_type_is_named_and_can_be_taken(tmp_path, kind, say, named):
     bag = with_lift(tmp_path / "throw", kind, say)
     (recording,) = read_recordings(bag)
-    assert [*recording.left_out] == ([named] if named else [])
+    assert [*moving_beside([recording])] == ([named] if named else [])
     assert not recording.remarks
     if named:
         (both,) = read_recordings(bag, key=["/joint_states", "/lift/height"])
@@ -278,11 +279,11 @@ def test_a_gripper_of_plain_numbers_is_named_and_can_be_taken(tmp_path, kind):
 
     bag = publishing(tmp_path / ("throw.bag" if kind == "ros1" else "throw"), kind, gripper)
     (recording,) = read_recordings(bag)
-    assert recording.left_out == {"/robotiq/position": (0.0, 200.0)}
+    assert moving_beside([recording]) == {"/robotiq/position": (0.0, 200.0)}
     (both,) = read_recordings(bag, key=["/joint_states", "/robotiq/position"])
     assert both.names == (*JOINTS, "/robotiq/position")
     assert np.ptp(both.positions[:, 7]) == 200
-    assert not both.left_out
+    assert not moving_beside([both])
     with pytest.raises(FileFormatError, match="no joint topic /robotiq/position"):
         read_recordings(bag, key="/robotiq/position")
 
@@ -310,4 +311,5 @@ def test_a_base_that_drives_is_named_whatever_its_message(tmp_path):
             ):
                 bag.write(topic, round(at * 1e9), store.serialize_cdr(message, kind))
     (read,) = read_recordings(tmp_path / "bag")
-    assert read.left_out == {"/base_pose": (0.0, pytest.approx(0.3 * t[-1]))}
+    driven = {"/base_pose/pose/position/x": (0.0, pytest.approx(0.3 * t[-1]))}
+    assert moving_beside([read]) == driven

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.arm.recordings.recording import Recording
-from prior_reinforce.arm.recordings.starts import odd_starts, ways_back
+from prior_reinforce.arm.recordings.starts import all_return, odd_starts, ways_back
 
 T = np.linspace(0, 1, 40)
 S = 10 * T**3 - 15 * T**4 + 6 * T**5
@@ -56,6 +56,16 @@ def test_ways_back_are_named_and_motions_that_return_by_themselves_are_none():
     assert ways_back(recordings(*(take(i) for i in range(6)))) == ""
     closed = [np.vstack([take(i)[::2], take(i)[::-2]]) for i in range(6)]
     assert ways_back(recordings(*closed)) == ""
+
+
+@pytest.mark.parametrize(("short", "said"), [(0.0, True), (0.08, True), (0.2, False)])
+def test_motions_that_all_end_where_they_began_may_hold_a_way_back(short, said):
+    there = np.array([take(i) for i in range(3)])
+    back = there[:, ::-1] + short * (there[:, -1:] - there[:, :1])
+    found = all_return(np.concatenate([there, back], axis=1))
+    assert found.startswith("every motion ends where it began") == said
+    assert ("(--rests 0.3)" in found) == said
+    assert all_return(there) == ""
 
 
 def test_what_stands_still_may_stand_anywhere():

@@ -3,14 +3,9 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.arm.recordings.stated import frames_said, names_said, units_said, with_rate
+from prior_reinforce.arm.recordings.stated import frames_said, names_said, units_said
 from prior_reinforce.errors import FileFormatError
-
-T = np.arange(101) / 50
-S = np.clip((T - 0.3) / 1.2, 0, 1)
-S = 10 * S**3 - 15 * S**4 + 6 * S**5
-Q = np.array([0.1, -0.6, 0.2]) + S[:, None] * [0.3, 0.4, -0.2]
-UR = ("pan", "lift", "elbow")
+from tests.arm.recordings.recorded import UR, Q
 
 
 @pytest.mark.parametrize(
@@ -35,32 +30,6 @@ def test_texts_that_contradict_each_other_are_refused():
     texts = {"joint_names": UR, "dof_names": UR[::-1]}
     with pytest.raises(FileFormatError, match="joint_names says pan, lift, elbow; dof_names says"):
         names_said("a.npz", texts, 3, UR)
-
-
-@pytest.mark.parametrize(
-    ("stated", "given", "rate"),
-    [
-        ({"meta.fps": 50}, None, {"fps": 50}),
-        ({"meta.frame_rate": 50}, None, {"frame_rate": 50}),
-        ({"meta.timing.dt_ms": 20.0}, None, {"dt_ms": 20.0}),
-        ({"meta.fps": 50, "rate": np.array(50.0)}, None, {"rate": 50.0}),
-        ({"meta.fps": 50, "meta.camera.fps": 30}, None, {"fps": 50}),
-        ({"meta.fps": 50, "meta.robot.hz": 100}, 50.0, {"fps": 50}),
-        ({"meta.version": 2}, None, {}),
-    ],
-)
-def test_a_rate_deep_in_what_a_file_says_is_its_rate(stated, given, rate):
-    assert {k: v for k, v in with_rate("a.npz", stated, given).items() if "." not in k} == rate
-
-
-def test_two_rates_that_contradict_each_other_are_refused():
-    stated = {"meta.fps": 50, "meta.robot.dt": 0.01}
-    with pytest.raises(
-        FileFormatError, match=r"meta\.fps says 50 .*, but meta\.robot\.dt 100; .*-r"
-    ):
-        with_rate("a.npz", stated)
-    with pytest.raises(FileFormatError, match=r"rate says 20 .*, but meta\.fps 50"):
-        with_rate("a.npz", {"rate": np.array(20), "meta.fps": 50})
 
 
 @pytest.mark.parametrize(

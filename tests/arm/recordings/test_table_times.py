@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from prior_reinforce.arm.recordings import read_recordings
+from prior_reinforce.arm.recordings.beside import moving_beside
 from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
@@ -115,7 +116,7 @@ def test_a_rail_at_constant_speed_is_a_channel_and_no_clock(tmp_path):
     table = np.column_stack([t, q[:, 1], 0.1 + 0.25 * t, np.arange(len(t)) + 7, 1e3 * t + 5])
     np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="t,a,rail,n,ms", comments="")
     assert read_recordings(tmp_path)[0].names == ("a", "rail")
-    assert [*read_recordings(tmp_path, joints=["a"])[0].left_out] == ["rail"]
+    assert [*moving_beside([read_recordings(tmp_path, joints=["a"])[0]])] == ["rail"]
 
 
 def table(folder, head, columns, above=""):

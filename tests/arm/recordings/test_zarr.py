@@ -9,6 +9,7 @@ import pytest
 import zarr
 
 from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
+from prior_reinforce.arm.recordings.beside import moving_beside
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from tests.arm.recordings.recorded import AS_IS, JOINTS, check_motions, write_outcomes, write_zarr
 
@@ -117,7 +118,7 @@ def test_attributes_name_the_joints_and_a_gripper_is_named(tmp_path):
     root["data"].create_array("grip", data=np.array(root["data/joint_pos"][:, 1:2]) ** 2)
     (first, *_) = read_recordings(path, key="joint_pos", rate=50, joints=JOINTS)
     assert first.names == JOINTS[::-1]
-    assert [*first.left_out] == ["grip"]
+    assert [*moving_beside([first])] == ["grip"]
 
 
 def test_attributes_name_the_joints_and_the_rate_however_deep(tmp_path):
@@ -138,4 +139,4 @@ def test_what_moves_at_a_rate_of_its_own_is_named(tmp_path):
     root = zarr.open_group(str(path), mode="r+")
     root["data"].create_array("gripper", data=80 + 100 * root["data/joint_pos"][::2, 1])
     (first, *_) = read_recordings(path, key="joint_pos", rate=50)
-    assert [name.split(" (")[0] for name in first.left_out] == ["gripper"]
+    assert [name.split(" (")[0] for name in moving_beside([first])] == ["gripper"]

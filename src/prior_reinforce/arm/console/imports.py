@@ -20,9 +20,8 @@ from msgspec import Struct
 
 from prior_reinforce.arm.console.verbs import Seen, Verbs
 from prior_reinforce.arm.console.view import State
-from prior_reinforce.arm.recordings import Preprocessing, ReadOptions, Recordings, inspect, read
+from prior_reinforce.arm.recordings import ReadOptions, Recordings, inspect, read
 from prior_reinforce.arm.recordings.naming import find_channels, numbered_like
-from prior_reinforce.arm.recordings.outcome_units import in_units
 from prior_reinforce.arm.recordings.outcomes import (
     OUTCOMES_FILE,
     SD,
@@ -32,7 +31,6 @@ from prior_reinforce.arm.recordings.outcomes import (
 )
 from prior_reinforce.arm.recordings.selection import Selection
 from prior_reinforce.arm.recordings.units import Ambiguity, say_names
-from prior_reinforce.arm.workspace.manifest import UNKNOWN
 from prior_reinforce.errors import (
     FileFormatError,
     InvalidDemonstrationsError,
@@ -144,12 +142,11 @@ class Imports:
         """Say what the recordings hold, and what an import would make of them."""
         with self._lock:
             files = len(self._files())
-            manifest = self._workspace.manifest
             if not files:
                 return Dropped(0)
             try:
-                found, form = self._read(), Preprocessing(manifest.format.dt)
-                inspection = inspect(found.selection, form, manifest.robot, manifest.gate)
+                found = self._read()
+                inspection = inspect(found.selection, self._workspace.wanted())
             except _OtherNamesError as error:
                 return Dropped(
                     files, problem=str(error), recorded=error.recorded, joints=error.joints
@@ -241,17 +238,14 @@ class Imports:
         there = [path for path in self._folder.iterdir() if path.name != OUTCOMES_FILE]
         # A folder that was dropped alone is the recordings.
         source = there[0] if len(there) == 1 and there[0].is_dir() else self._folder
-        manifest = self._workspace.manifest
-        form, names = manifest.format, manifest.outcome_format.names
-        own = () if form.names == UNKNOWN else (form.names, form.units)  # else as recorded
-        joints = self._columns or (own[0] if own else None)
+        wanted = self._workspace.wanted()
+        joints = self._columns or wanted.names
         recordings = read(require_inside(source, self._verbs.folder), ReadOptions(joints=joints))
         first = recordings.episodes[0]
         if joints is not None and first.named and _needs_choice(joints, first.names):
-            raise _OtherNamesError(form.names, first.names)
-        selection = recordings.select(*own)
-        known = recordings.outcomes(None, names, may_lack=True)
-        known, unclear = in_units(known, manifest.outcome_format.units, None)
+            raise _OtherNamesError(wanted.names or joints, first.names)
+        selection = recordings.select(wanted)
+        known, unclear = recordings.outcomes(wanted, may_lack=True)
         unclear += recordings.ambiguities + selection.ambiguities
         missing = missing_outcomes(selection.episodes, known)
         placed = [episode for episode in selection.episodes if episode not in missing]

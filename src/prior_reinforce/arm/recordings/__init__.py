@@ -9,6 +9,7 @@ from prior_reinforce.arm.recordings.importer import inspect_recordings as inspec
 from prior_reinforce.arm.recordings.importer import read as read
 from prior_reinforce.arm.recordings.importer import read_recordings as read_recordings
 from prior_reinforce.arm.recordings.inspection import Inspection as Inspection
+from prior_reinforce.arm.recordings.inspection import Wanted as Wanted
 from prior_reinforce.arm.recordings.inspection import inspect as inspect
 from prior_reinforce.arm.recordings.options import ReadOptions as ReadOptions
 from prior_reinforce.arm.recordings.preprocessing import Preprocessing as Preprocessing

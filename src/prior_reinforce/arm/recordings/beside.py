@@ -6,9 +6,10 @@ motion; a clock runs with it.
 
 from __future__ import annotations
 
+import math
 import re
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -16,8 +17,14 @@ import numpy as np
 from prior_reinforce.arm.recordings.channels import measured_of
 from prior_reinforce.arm.recordings.clock import COUNTER, Times, says_time, tells_time
 from prior_reinforce.arm.recordings.naming import vectors
-from prior_reinforce.arm.recordings.recording import Positions
-from prior_reinforce.arm.recordings.units import SECONDS, Ambiguity, say_names
+from prior_reinforce.arm.recordings.recording import Beside, Positions, Recording
+from prior_reinforce.arm.recordings.units import (
+    CHANNEL_UNITS,
+    SECONDS,
+    Ambiguity,
+    say_names,
+    split_unit,
+)
 from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.plans.signals import held_channels
 from prior_reinforce.plans.whole_turns import TURN
@@ -58,47 +65,87 @@ _SAME_CLOCK = 0.01
 """Share by which two clocks of a recording differ at most. Ours."""
 
 
+def moving_beside(recordings: Iterable[Recording]) -> dict[str, tuple[float, float]]:
+    """Return what moves beside the motion in any of the recordings, with its range in all.
+
+    A plan lacks it.
+    """
+    ends: dict[str, list[float]] = {}
+    for recording in recordings:
+        for low, high, called in recording.beside.values():
+            ends.setdefault(called, []).extend((low, high))
+    return {called: (min(own), max(own)) for called, own in ends.items() if called}
+
+
 def columns_beside(
     names: Sequence[str], values: Positions, taken: Sequence[int], times: Times
-) -> dict[str, tuple[float, float]]:
-    """Return the range of each column that moves beside those taken; numbered ones are a group."""
+) -> dict[str, Beside]:
+    """Return every column but those taken; numbered ones are one array."""
     others = [i for i in range(len(names)) if i not in taken]
-    groups = [[others[i] for i in g] for g in vectors([names[i] for i in others]).values()]
+    bare = [split_unit(names[i], CHANNEL_UNITS)[0] for i in others]
+    groups = [[others[i] for i in group] for group in vectors(bare).values()]
     in_groups = {i for group in groups for i in group}
     groups += [[i] for i in others if i not in in_groups]
-    arrays = {say_names([names[i] for i in group]): values[:, group] for group in groups}
-    return moves_beside(values[:, list(taken)], arrays, times, [names[i] for i in taken])
+    called = {say_names([names[i] for i in group]): group for group in groups}
+    arrays = {name: values[:, group] for name, group in called.items()}
+    columns = {name: [names[i] for i in group] for name, group in called.items()}
+    of_motion = [names[i] for i in taken]
+    return arrays_beside(values[:, list(taken)], arrays, times, of_motion, columns)
 
 
-def moves_beside(
-    motion: Positions, others: Arrays, times: Times, called: Sequence[str] = ()
-) -> dict[str, tuple[float, float]]:
-    """Return the range of each array that moves and is not taken, at the motion's rate or its own.
+def arrays_beside(
+    motion: Positions,
+    others: Arrays,
+    times: Times,
+    called: Sequence[str] = (),
+    columns: Mapping[str, Sequence[str]] | None = None,
+) -> dict[str, Beside]:
+    """Return every channel of other arrays than the motion, at its rate or their own.
 
-    `called` are names of the motion. Not listed are clocks, other readings of the motion such as
-    its commands, and what is named like rates, forces, poses, or anything else that is no part of
-    an arm.
+    `called` are names of the motion, and `columns` those of the arrays' channels. What moves has
+    the name of its array; but the numbers of where a base stands, lengths and angles, have theirs.
+    Arrays of several channels that are no part of an arm by their name are left out.
     """
     found = {}
     for name, values in others.items():
-        most = 3 if is_of_base(name.rpartition("/")[2]) else 2
-        if not 1 <= values.ndim <= most or values.dtype.kind not in "biuf" or not values.size:
+        width, of_base = math.prod(values.shape[1:]), is_of_base(name.rpartition("/")[2])
+        may = may_move(name, width) and 1 <= values.ndim <= (3 if of_base else 2)
+        if values.dtype.kind not in "biuf" or not values.size or not (may or values.ndim == 1):
             continue
-        columns = values.reshape(len(values), -1).astype(np.float64)
-        if not may_move(name, columns.shape[1]):
-            continue
-        moving = columns[:, [i for i in range(columns.shape[1]) if _moves(columns[:, i])]]
-        said, at = name, times
-        if len(columns) != len(motion):
-            if not _is_series(name, moving, others):
-                continue
-            said = f"{name} ({len(columns)} frames, beside {len(motion)})"
-            at = np.linspace(times[0], times[-1], len(columns))
-            columns = np.column_stack([np.interp(times, at, own) for own in columns.T])
-        clocks = all(is_clock(name, column, at) for column in moving.T)
-        if not clocks and (_of_another(name, called) or not _follows(columns, motion)):
-            found[said] = float(np.nanmin(moving)), float(np.nanmax(moving))
+        numbers = values.reshape(len(values), -1).astype(np.float64)
+        own = (columns or {}).get(name) or [f"{name}[{i}]" for i in range(width)]
+        own = own if width > 1 else [name]
+        moving = np.array([may and _moves(column) for column in numbers.T])
+        if not _may_be_of_arm(name, numbers, moving, motion, times, called, others):
+            moving[:] = False
+        rate = f" ({len(values)} frames, beside {len(motion)})" * (len(values) != len(motion))
+        for channel, column, moves in zip(own, numbers.T, moving.tolist(), strict=True):
+            if np.any(np.isfinite(column)):
+                said = f"{channel if of_base else name}{rate}" if moves else ""
+                found[channel] = Beside(float(np.nanmin(column)), float(np.nanmax(column)), said)
     return found
+
+
+def _may_be_of_arm(
+    name: str,
+    columns: np.ndarray,
+    moving: np.ndarray,
+    motion: Positions,
+    times: Times,
+    called: Sequence[str],
+    others: Arrays,
+) -> bool:
+    """Whether an array moves, and is no clock and no other reading of the motion: its command."""
+    at = times
+    if len(columns) != len(motion):
+        if not _is_series(name, columns[:, moving], others):
+            return False
+        at = np.linspace(times[0], times[-1], len(columns))
+    if all(is_clock(name, column, at) for column in columns[:, moving].T):
+        return False
+    if at is not times:
+        columns = np.column_stack([np.interp(times, at, column) for column in columns.T])
+    return _of_another(name, called) or not _follows(columns, motion)
 
 
 def twin_vectors(names: Sequence[str], values: Positions) -> Iterator[Ambiguity]:
@@ -179,7 +226,7 @@ def _moves(values: Times) -> bool:
 def _follows(values: np.ndarray, motion: Positions) -> bool:
     """Whether columns are another reading of the motion's: in another unit, or a command."""
     width, most = values.shape[1], motion.shape[1]
-    if width > most and width % most == 0:  # several vectors under one name
+    if 0 < most < width and width % most == 0:  # several vectors under one name
         return all(_follows(values[:, k :: width // most], motion) for k in range(width // most))
     finite = np.all(np.isfinite(np.concatenate([values, motion], axis=1)), axis=1)
     values, motion = values[finite], motion[finite]

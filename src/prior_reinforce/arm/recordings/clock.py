@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float, Shaped
 
+from prior_reinforce.arm.recordings.naming import OTHER_NAMES
 from prior_reinforce.arm.recordings.units import SECONDS, Ambiguity, judge_unit, split_unit
 from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidDemonstrationsError
 
@@ -106,14 +107,16 @@ def declared_rate(
 ) -> dict[str, Any]:
     """Return the rate that a file declares, if any, as `clock_of` takes it.
 
-    `said` are its numbers by name, for instance `fps` 50 or `dt_ms` 20. FileFormatError if two
-    contradict each other, and no rate is given.
+    `said` are its numbers by name, for instance `fps` 50 or `dt_ms` 20, or by their place deep in
+    it, `meta.fps`; these count less. FileFormatError if two contradict each other, and no rate is
+    given.
     """
     found: dict[str, float] = {}
-    for name, value in said.items():
-        bare, unit = split_unit(name, SECONDS)
+    for name, value in sorted(said.items(), key=lambda item: "." in item[0]):
+        place, _, called = name.rpartition(".")
+        bare, unit = split_unit(called, SECONDS)
         is_period = _PERIOD.fullmatch(bare.lower()) is not None
-        if not (is_period or _RATE.fullmatch(name.lower())):
+        if OTHER_NAMES.search(place) or not (is_period or _RATE.fullmatch(called.lower())):
             continue
         if np.size(value) != 1 or np.asarray(value).dtype.kind not in "fiu":
             raise FileFormatError(
@@ -122,14 +125,14 @@ def declared_rate(
             )
         number = float(value) * SECONDS[unit or "s"]
         found[name] = 1 / number if is_period and number else number
+    first, of_first = next(iter(found.items()), ("", 0.0))
     for name, rate in found.items():
-        first, of_first = next(iter(found.items()))
         if given is None and not _same(rate, of_first):
             raise FileFormatError(
                 f"{where}: {first} says {of_first:.4g} frames a second, but {name} {rate:.4g}; "
                 "take one: --rate"
             )
-    return dict(zip(("rate_name", "own_rate"), next(iter(found.items()), ()), strict=False))
+    return {"rate_name": first.rpartition(".")[2], "own_rate": of_first} if found else {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,7 +285,8 @@ def clock_among(
     `said` are further numbers of the file, a rate perhaps among them. An array that is asked for by
     name counts more.
     """
-    asked, own = options.time_column, declared_rate(where, said or {}, options.rate)
+    asked = options.time_column
+    own = {} if asked is not None else declared_rate(where, said or {}, options.rate)
     there = {name: a.ravel() if a.size == count else a for name, a in arrays.items()}
     fit = [name for name, array in there.items() if array.shape == (count,)]
     times = [n for n in there if split_unit(n, SECONDS)[0] in _CALLED]
@@ -292,7 +296,7 @@ def clock_among(
             raise FileFormatError(
                 f"{where} has no array {asked}; it holds {sorted(arrays)}: name one"
             )
-        times, own = [n for n in there if n == asked], own if not times else {}
+        times = [n for n in there if n == asked]
     others = [] if asked else [n for n in fit if skips_frames(there[n])]
     if not times and others and (own or options.rate is not None):
         own |= {"stamps": there[others[0]], "name": others[0], "unit": FRAME}

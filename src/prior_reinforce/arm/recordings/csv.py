@@ -39,7 +39,7 @@ from prior_reinforce.arm.recordings.table_times import (
     time_columns,
     with_whole_dates,
 )
-from prior_reinforce.arm.recordings.tables import Table, read_table
+from prior_reinforce.arm.recordings.tables import Table, is_unnamed, read_table
 from prior_reinforce.arm.recordings.units import Ambiguity, say_names
 from prior_reinforce.errors import FileFormatError
 
@@ -190,7 +190,8 @@ def _episode(
         remarks += [f"{say_names([called[i] for i in left])} left out, which {why}"] * bool(left)
     twins = all_read and twin_vectors([called[i] for i in channels], table.values[:, channels])
     own, units = without_units([called[i] for i in channels])
-    rest = [i for i in others if i not in (*channels, *counts) and not table.is_text(i)]
+    unnamed = [i for i in counts if is_unnamed(table.names[i])]
+    rest = [i for i in others if i not in channels and i not in unnamed]
     return recorded(
         episode,
         clock,
@@ -202,17 +203,12 @@ def _episode(
         units=tuple(table.units[i] or u for i, u in zip(channels, units, strict=True)),
         ambiguities=(*guessed, *times.guessed, *clock.ambiguities, *(twins or ())),
         columns=own if table.named else (),
-        left_out=columns_beside(
+        beside=columns_beside(
             [called[i] for i in (*channels, *rest)],
             table.values[:, [*channels, *rest]],
             range(len(channels)),
             clock.times,
         ),
-        beside={
-            called[i]: (float(np.nanmin(table.values[:, i])), float(np.nanmax(table.values[:, i])))
-            for i in others
-            if i not in channels and np.any(np.isfinite(table.values[:, i]))
-        },
     )
 
 

@@ -30,7 +30,7 @@ def check_held(recordings: Sequence[Recording], robot: RobotLimits | None) -> No
         elsewhere: dict[tuple[float, float], list[str]] = {}
         for recording in recordings:
             for column in [one for one in recording.beside if find_channels([joint], [one])]:
-                span, unit = recording.beside[column], split_unit(column, CHANNEL_UNITS)[1]
+                span, unit = recording.beside[column][:2], split_unit(column, CHANNEL_UNITS)[1]
                 units = (
                     ["m", "rad"] if max(map(abs, span)) <= UNITS["rad"].largest else CHANNEL_UNITS
                 )

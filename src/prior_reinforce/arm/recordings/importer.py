@@ -16,14 +16,14 @@ from typing import Any
 
 from prior_reinforce.arm.recordings import csv, hdf5, lerobot, npz, ros, zarr
 from prior_reinforce.arm.recordings.bounds import check_numbers
-from prior_reinforce.arm.recordings.inspection import Inspection, inspect
+from prior_reinforce.arm.recordings.inspection import Inspection, Wanted, inspect
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.outcome_units import in_units
 from prior_reinforce.arm.recordings.outcomes import (
     OUTCOMES_FILE,
     Outcomes,
     check_rows,
-    digits_at_end,
+    in_order,
     outcomes_of,
     read_outcomes,
     table_beside,
@@ -32,7 +32,7 @@ from prior_reinforce.arm.recordings.preprocessing import Preprocessing, at_rests
 from prior_reinforce.arm.recordings.preview import Preview
 from prior_reinforce.arm.recordings.recording import Episodes, Recording, has_files, refuse_pointers
 from prior_reinforce.arm.recordings.selection import Selection, select
-from prior_reinforce.arm.recordings.starts import check_outcomes, ways_back
+from prior_reinforce.arm.recordings.starts import ways_back
 from prior_reinforce.arm.recordings.takes import doubts_of_times
 from prior_reinforce.arm.recordings.units import Ambiguity, listed, raise_if_ambiguous
 from prior_reinforce.arm.robots import GateSettings, RobotLimits
@@ -141,25 +141,24 @@ def import_demonstrations(
         ConfigurationError: Settings that contradict each other.
         MissingExtraError: The format's optional library is not installed.
     """
+    wanted = Wanted(
+        None if names is None else tuple(names),
+        plan_units,
+        outcome_names,
+        outcome_units,
+        preprocessing,
+        robot,
+        gate,
+        declared,
+        before,
+    )
     recordings = read(source, ReadOptions(**options))
-    selection = recordings.select(names, plan_units)
-    ambiguities = recordings.ambiguities + selection.ambiguities
-    try:
-        known = recordings.outcomes(outcomes, outcome_names)
-    except InvalidDemonstrationsError as missing:
-        raise_if_ambiguous(() if take_guesses else ambiguities, also=str(missing))
-        raise
-    if not isinstance(outcomes, Mapping):
-        known, unclear = in_units(known, outcome_units, outcome_unit)
-        ambiguities += unclear
-    raise_if_ambiguous(ambiguities, take_guesses=take_guesses)
-    check_outcomes(selection, known)  # before the work of the next line
-    inspection = inspect(selection, preprocessing, robot, gate, before)
-    names = outcome_names if outcome_names is not None or not known.named else known.names
-    units = tuple(outcome_units or [unit or "m" for unit in known.units])
-    names = OutcomeFormat.metres(len(units)).names if names is None else names
-    form = OutcomeFormat(tuple(names), units)
-    return recordings.demonstrations(inspection, known, form, declared=declared)
+    selection = recordings.select(wanted)
+    unclear = recordings.ambiguities + selection.ambiguities
+    asked = () if take_guesses else unclear
+    known, more = recordings.outcomes(wanted, outcomes, outcome_unit, unclear=asked)
+    raise_if_ambiguous(unclear + more, take_guesses=take_guesses)
+    return recordings.demonstrations(selection, known, wanted)
 
 
 def inspect_recordings(
@@ -177,9 +176,11 @@ def inspect_recordings(
     Missing or implausible units, times and names are inferred, and listed as ambiguous. Arguments
     and errors are those of `import_demonstrations`.
     """
+    called = None if names is None else tuple(names)
+    wanted = Wanted(called, plan_units, preprocessing=preprocessing, robot=robot, gate=gate)
     recordings = read(source, ReadOptions(**options))
-    selection = recordings.select(names, plan_units)
-    found = inspect(selection, preprocessing, robot, gate)
+    selection = recordings.select(wanted)
+    found = inspect(selection, wanted)
     return replace(found, ambiguities=recordings.ambiguities + selection.ambiguities)
 
 
@@ -246,40 +247,61 @@ class Recordings:
         alone = FORMATS[self.format].whole or (self.source / "metadata.yaml").is_file()
         return [self.source.parent, self.source] if alone else [self.source]
 
-    def select(
-        self, names: Sequence[str] | None = None, plan_units: Sequence[str] | None = None
-    ) -> Selection:
+    def select(self, wanted: Wanted) -> Selection:
         """Return the channels of the plan, as in `selection.select`."""
-        options = self.options
         return select(
             self.episodes,
-            options.joints,
-            names,
-            options.units,
-            plan_units,
+            self.options.joints,
+            wanted.names,
+            self.options.units,
+            wanted.plan_units,
             normalised=self.format == "lerobot",
         )
 
     def outcomes(
         self,
+        wanted: Wanted,
         given: str | os.PathLike[str] | Mapping[str, Sequence[float]] | None = None,
-        names: Sequence[str] | None = None,
+        unit: str | None = None,
         *,
+        unclear: Sequence[Ambiguity] = (),
         may_lack: bool = False,
-    ) -> Outcomes:
-        """Find outcomes: those given, a table beside the recordings, or the recordings' own.
+    ) -> tuple[Outcomes, tuple[Ambiguity, ...]]:
+        """Find outcomes in their wanted units, and what is only guessed of these.
+
+        They are those given, a table beside the recordings, or the recordings' own.
 
         Args:
-            given: A table, or numbers by episode.
-            names: Components wanted, in order; None takes them as they stand.
+            wanted: Names and units of the components.
+            given: A table, or numbers by episode, which are in the wanted units.
+            unit: Of the table's columns that name none.
+            unclear: What else is to be said where there are no outcomes.
             may_lack: Where there are none, return none instead of raising.
 
         Raises:
             ConfigurationError: The given outcomes are not numbers.
             InvalidDemonstrationsError: There are no outcomes, a component is missing, or a row is
-                of no episode of the source.
+                of no episode of the source; or as in `in_units`.
+            UnclearUnitsError: The same, where something is unclear.
             FileFormatError: The table is missing or damaged.
         """
+        try:
+            found = self._outcomes(given, wanted.outcome_names, may_lack=may_lack)
+        except InvalidDemonstrationsError as missing:
+            raise_if_ambiguous(unclear, also=str(missing))
+            raise
+        if isinstance(given, Mapping):
+            return found, ()
+        return in_units(found, wanted.outcome_units, unit)
+
+    def _outcomes(
+        self,
+        given: str | os.PathLike[str] | Mapping[str, Sequence[float]] | None,
+        names: Sequence[str] | None,
+        *,
+        may_lack: bool,
+    ) -> Outcomes:
+        """The outcomes, in the units that their source states."""
         if isinstance(given, Mapping):
             try:
                 numbers = {str(name): tuple(map(float, value)) for name, value in given.items()}
@@ -308,64 +330,41 @@ class Recordings:
         )
 
     def _in_order(self, found: Outcomes) -> Outcomes:
-        """Match outcomes of motions that one file was cut into: by name, else in their order.
-
-        That is the order of the numbers that end their names, or of their rows.
-
-        Raises:
-            InvalidDemonstrationsError: They are not as many, and name none of the motions; or as in
-                `check_rows`.
-        """
+        """Check rows by their names; where one file was cut and none is named, take their order."""
         motions = [recording.episode for recording in self.episodes]
-        if not self.options.rests or not {*motions}.isdisjoint(found.episodes):
-            # Where some are asked for, the table may be of other sources, too.
-            check_rows(found, motions, self.there, others=self.options.episodes is not None)
-            return found
-        if len(motions) == len(found.episodes):
-            numbers = [digits_at_end(name) for name in found.episodes]
-            if all(numbers) and len({*numbers}) == len(numbers):
-                order = sorted(map(int, numbers))
-                motions = [motions[order.index(int(number))] for number in numbers]
-            return replace(found, episodes=tuple(motions))
-        remedy = "leave out those without one (--leave-out), or cut at other rests (--rests)"
-        raise InvalidDemonstrationsError(
-            f"{self.source} was cut into {len(motions)} motions, and {found.where} has "
-            f"{len(found.episodes)} outcomes: name each outcome's motion ({motions[0]}); "
-            f"{ways_back(self.episodes) or remedy}"
-        )
+        if self.options.rests and {*motions}.isdisjoint(found.episodes):
+            return in_order(self.source, motions, found, ways_back(self.episodes))
+        # Where some are asked for, the table may be of other sources, too.
+        check_rows(found, motions, self.there, others=self.options.episodes is not None)
+        return found
 
     def demonstrations(
-        self,
-        inspection: Inspection,
-        outcomes: Outcomes,
-        form: OutcomeFormat,
-        *,
-        declared: Callable[[PlanFormat], Symmetry | None] = lambda _: None,
+        self, selection: Selection, outcomes: Outcomes, wanted: Wanted
     ) -> ImportResult:
-        """Join plans with outcomes.
-
-        Args:
-            inspection: What becomes of these recordings, or of some of them.
-            outcomes: In the wanted units.
-            form: What their numbers mean.
-            declared: Says how motions of a format may be moved, if they may.
+        """Make plans of these recordings, or of some of them, and join them with their outcomes.
 
         Raises:
-            InvalidDemonstrationsError: As in `outcomes_of`, or a motion that comes twice.
+            InvalidDemonstrationsError: As in `outcomes_of` and `inspect`, or a motion that comes
+                twice.
         """
-        selection, processed = inspection.selection, inspection.processed
-        seen, sd = outcomes_of(selection.episodes, outcomes)
+        # First, since what comes then takes its time.
+        seen, sd = outcomes_of(selection.episodes, outcomes, ways_back(selection.recordings))
+        inspection = inspect(selection, wanted)
         if inspection.copies:
             raise InvalidDemonstrationsError(inspection.copies)
+        units = tuple(wanted.outcome_units or [unit or "m" for unit in outcomes.units])
+        names = wanted.outcome_names
+        if names is None:
+            names = outcomes.names if outcomes.named else OutcomeFormat.metres(len(units)).names
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # the preview's remarks say it, with the option to give
             demonstrations = Demonstrations(
-                processed.plans,
+                inspection.processed.plans,
                 seen,
                 inspection.format,
-                form,
+                OutcomeFormat(tuple(names), units),
                 sd,
-                symmetry=declared(inspection.format),
+                symmetry=wanted.declared(inspection.format),
             )
         title = f"{self.source.name} ({self.format})"
         preview = Preview(title, inspection, demonstrations, outcomes.where)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -19,7 +19,7 @@ from prior_reinforce.arm.recordings.preprocessing import (
 )
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.selection import Selection
-from prior_reinforce.arm.recordings.starts import odd_starts
+from prior_reinforce.arm.recordings.starts import all_return, odd_starts
 from prior_reinforce.arm.recordings.turns import aligned
 from prior_reinforce.arm.recordings.units import Ambiguity, say_names
 from prior_reinforce.arm.robots import GateSettings, RobotLimits, check_plan
@@ -30,15 +30,12 @@ from prior_reinforce.plans.interpolation import RATE
 from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.speeds import Channels
+from prior_reinforce.plans.symmetry import Symmetry
 from prior_reinforce.units import UNITS
 
 _SMOOTH_HZ = 20
 _SMOOTH = f"--smooth {_SMOOTH_HZ}"
 """Removes an encoder's noise; a throw has nothing above 20 Hz. Ours."""
-
-_RETURNED = 0.05
-"""Part of its range by which each channel of a motion that returns may end beside its start (ours).
-"""
 _WORST = 2.5
 """Standard deviations that the worst of a plan's frames is off by. Ours: measured, 30 plans of 88
 frames, 2.3 to 2.9; what an end leaps by from rest is 1.3 to 2.4."""
@@ -53,6 +50,30 @@ _MUCH_NOISE = 0.25
 
 
 @dataclass(frozen=True, eq=False)
+class Wanted:
+    """What recordings are to become, and what they have to keep to."""
+
+    names: tuple[str, ...] | None = None
+    """Of the joints in the plan; None keeps the recorded ones."""
+    plan_units: Sequence[str] | None = None
+    """Of the joints in the plan; None is radians for angles, metres for lengths."""
+    outcome_names: Sequence[str] | None = None
+    """Of the outcome's components; None takes those of the outcomes."""
+    outcome_units: Sequence[str] | None = None
+    """Of the components; None takes those that the outcomes state, or metres."""
+    preprocessing: Preprocessing | None = None
+    """Time step, horizon and trimming; None takes the defaults."""
+    robot: RobotLimits | None = None
+    """Limits that every demonstration is checked against; None checks none."""
+    gate: GateSettings | None = None
+    """The gate's settings for that check."""
+    declared: Callable[[PlanFormat], Symmetry | None] = lambda _: None
+    """Says how motions of a format may be moved, if they may."""
+    before: Demonstrations | None = None
+    """Demonstrations beside which these are to be, in their turns, signs and units."""
+
+
+@dataclass(frozen=True, eq=False)
 class Inspection:
     """What recordings hold, and what an import would make of them."""
 
@@ -62,10 +83,7 @@ class Inspection:
     """The plans made of them."""
     format: PlanFormat
     """What their numbers mean."""
-    settings: Preprocessing
-    limits: RobotLimits | None = None
-    """Limits that the demonstrations were checked against, with the gate's settings."""
-    gate: GateSettings | None = None
+    wanted: Wanted
     reports: tuple[LimitReport, ...] = ()
     """The gate's verdict on each; empty if no robot is named."""
     ambiguities: tuple[Ambiguity, ...] = ()
@@ -78,7 +96,7 @@ class Inspection:
     @property
     def robot(self) -> str | None:
         """The robot whose limits the demonstrations were checked against."""
-        return None if self.limits is None else self.limits.robot
+        return None if self.wanted.robot is None else self.wanted.robot.robot
 
     @cached_property
     def copies(self) -> str:
@@ -96,7 +114,7 @@ class Inspection:
         left_out = self.selection.left_out
         first = (
             self.copies,
-            self._returns(),
+            all_return(self.processed.plans),
             *self.selection.remarks,
             *self._broken(),
             self._noise_warning(),
@@ -208,17 +226,6 @@ class Inspection:
             found.append(f"with {_SMOOTH} fewer demonstrations break a limit")
         return found
 
-    def _returns(self) -> str:
-        """That every motion ends where it began, if so: it may hold a way back."""
-        plans = self.processed.plans
-        near = _RETURNED * np.ptp(plans, axis=1)
-        if np.any(np.abs(plans[:, -1] - plans[:, 0]) > near):
-            return ""
-        return (
-            "every motion ends where it began: if it rests before it goes back, cut it there "
-            "(--rests 0.3), and leave the way back out"
-        )
-
     def _noise(self) -> str:
         names, units, done = self.selection.names, self.selection.units, self.processed
         noisiest = int(np.argmax(done.noise))
@@ -252,7 +259,7 @@ class Inspection:
 
     def _noise_warning(self) -> str:
         """Share of a limit consumed by noise, if significant; noise on held channels is ignored."""
-        names, limits, processed = self.selection.names, self.limits, self.processed
+        names, limits, processed = self.selection.names, self.wanted.robot, self.processed
         if limits is None or not self.reports or processed.smoothed is not None:
             return ""
         period = max(processed.dt, max(recording.period for recording in self.recordings))
@@ -280,42 +287,31 @@ class Inspection:
         out_of_range = all("position" in each for each in broken if each)
         if self.processed.smoothed is not None or out_of_range:
             return False
-        settings = replace(self.settings, smooth=_SMOOTH_HZ)
+        how = replace(self.wanted.preprocessing or Preprocessing(), smooth=_SMOOTH_HZ)
         try:
-            smooth = inspect(self.selection, settings, self.limits, self.gate)
+            smooth = inspect(self.selection, replace(self.wanted, preprocessing=how, before=None))
         except ConfigurationError:  # recordings too short to be smoothed
             return False
         return sum(r.refused for r in smooth.reports) < sum(r.refused for r in self.reports)
 
 
-def inspect(
-    selection: Selection,
-    preprocessing: Preprocessing | None = None,
-    robot: RobotLimits | None = None,
-    gate: GateSettings | None = None,
-    before: Demonstrations | None = None,
-) -> Inspection:
+def inspect(selection: Selection, wanted: Wanted) -> Inspection:
     """Make plans of recordings, and check each against the robot's limits, once.
 
-    Args:
-        selection: Recordings with the plan's channels.
-        preprocessing: Time step, horizon and trimming; None takes the defaults.
-        robot: Limits that every demonstration is checked against; None checks none. In units that
-            the gate cannot judge, none is checked either.
-        gate: The gate's settings for that check.
-        before: Demonstrations beside which these are to be, in their turns, signs and units.
+    In units that the gate cannot judge, none is checked.
 
     Raises:
         InvalidDemonstrationsError: As in `check_held`, `check_scale` and `aligned`; or an episode
             that never moves, or is longer than the horizon.
         ConfigurationError: Settings that contradict each other.
     """
-    settings = preprocessing or Preprocessing()
+    robot, before = wanted.robot, wanted.before
     check_held(selection.recordings, robot)
     if before is not None:
         check_scale(before, selection)
     selection, form = aligned(selection, robot, before)
-    processed = preprocess(selection.recordings, selection.units, settings)
+    how = wanted.preprocessing or Preprocessing()
+    processed = preprocess(selection.recordings, selection.units, how)
     form = replace(form, dt=processed.dt)
     shown = () if before is None else before.plans
     odd = odd_starts([*shown], [*processed.plans], selection.episodes, form.names, form.units)
@@ -323,8 +319,9 @@ def inspect(
     reports: tuple[LimitReport, ...] = ()
     if robot is not None:
         with suppress(InvalidPlanError):
-            reports = tuple(check_plan(Plan(p, form), robot, None, gate) for p in processed.plans)
-    return Inspection(selection, processed, form, settings, robot, gate, reports)
+            plans = [Plan(plan, form) for plan in processed.plans]
+            reports = tuple(check_plan(plan, robot, None, wanted.gate) for plan in plans)
+    return Inspection(selection, processed, form, wanted, reports)
 
 
 def acceleration_of(noise: Channels, dt: float) -> Channels:

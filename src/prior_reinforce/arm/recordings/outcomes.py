@@ -330,10 +330,35 @@ def _renumber(episodes: Sequence[str], rows: Sequence[str]) -> str:
     return f"the table begins with {of_table}, and they with {first}: renumber it if so; else "
 
 
-def outcomes_of(episodes: Sequence[str], outcomes: Outcomes) -> tuple[Points, Points]:
+def in_order(source: Path, motions: Sequence[str], outcomes: Outcomes, advice: str) -> Outcomes:
+    """Match outcomes of the motions that one file was cut into in their order.
+
+    That is the order of the numbers that end their names, or of their rows.
+
+    Raises:
+        InvalidDemonstrationsError: They are not as many; it ends in the advice, if there is any.
+    """
+    rows = outcomes.episodes
+    if len(motions) != len(rows):
+        remedy = "leave out those without one (--leave-out), or cut at other rests (--rests)"
+        raise InvalidDemonstrationsError(
+            f"{source} was cut into {len(motions)} motions, and {outcomes.where} has {len(rows)} "
+            f"outcomes: name each outcome's motion ({motions[0]}); {advice or remedy}"
+        )
+    numbers = [digits_at_end(name) for name in rows]
+    if all(numbers) and len({*numbers}) == len(numbers):
+        order = sorted(map(int, numbers))
+        motions = [motions[order.index(int(number))] for number in numbers]
+    return replace(outcomes, episodes=tuple(motions))
+
+
+def outcomes_of(
+    episodes: Sequence[str], outcomes: Outcomes, advice: str = ""
+) -> tuple[Points, Points]:
     """Return each episode's outcome in order, and its standard deviation, each (N, k).
 
     Episodes are matched by name, else by the number at the end of their names (`3` is `demo_003`).
+    `advice` is for who lacks some.
 
     Raises:
         InvalidDemonstrationsError: Outcomes that are missing or not finite; each is named.
@@ -344,7 +369,7 @@ def outcomes_of(episodes: Sequence[str], outcomes: Outcomes) -> tuple[Points, Po
         raise InvalidDemonstrationsError(
             f"no outcome for episodes {listed(missing)} in {outcomes.where} (it has "
             f"{listed(there) or 'none'}); {_renumber(episodes, there)}measure and add them, or "
-            "leave those episodes out"
+            f"leave those episodes out{'; ' * bool(advice)}{advice}"
         )
     rows = [there.index(picked[episode]) for episode in episodes]
     values = outcomes.values[rows]

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -45,6 +45,18 @@ EPISODE_COLUMNS = tuple(
 """Names of a column that says of which episode a row is."""
 
 
+class Beside(NamedTuple):
+    """A channel that a file holds beside the motion."""
+
+    low: float
+    """Least value."""
+    high: float
+    """Greatest value."""
+    moving: str = ""
+    """What to call it, alone or with those numbered like it, where it moves and may be a part of
+    the arm; else empty."""
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """One demonstration before trimming and resampling: uneven times, any channels."""
@@ -71,10 +83,8 @@ class Recording:
     columns: tuple[str, ...] = ()
     """The file's own names of the D channels, if not `names`: numbered columns that are taken as
     the joints in order."""
-    left_out: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """Least and greatest value of other channels that move, by name."""
-    beside: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """The same of every other channel, moving or not, by its name with its unit."""
+    beside: Mapping[str, Beside] = field(default_factory=dict)
+    """What else the file holds, channel by channel: by the file's name, with its unit."""
     named: bool = field(init=False)
     """Whether the file names the channels."""
 

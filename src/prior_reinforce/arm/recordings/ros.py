@@ -18,12 +18,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import is_of_base, may_move, moves_beside
+from prior_reinforce.arm.recordings.beside import columns_beside, is_of_base, may_move
 from prior_reinforce.arm.recordings.bounds import check_names, check_numbers
 from prior_reinforce.arm.recordings.clock import Times
-from prior_reinforce.arm.recordings.naming import find_channels, vectors
+from prior_reinforce.arm.recordings.naming import find_channels
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
+    Beside,
     Episodes,
     Positions,
     Recording,
@@ -122,13 +123,13 @@ def read(source: Path, options: ReadOptions) -> Episodes:
                 taken = {own[0].topic for own, _ in topics}
                 rest = {c.topic: c for c in reader.connections if c.topic not in taken}
                 joint_topics = sorted(n for n, c in rest.items() if c.msgtype == _STATE)
-                moving: dict[str, tuple[float, float]] = {}
+                elsewhere: dict[str, Beside] = {}
                 unknown = []
                 for c in rest.values():
                     if c.msgtype not in reader.typestore.fielddefs:
                         unknown.append(f"{c.topic} ({c.msgtype})")
                     elif c.msgtype not in (_STATE, _TRAJECTORY):
-                        moving |= _moving(c.topic, _messages(reader, [c]))
+                        elsewhere |= _beside(c.topic, _messages(reader, [c]))
         notes = [f"not read: topics {', '.join(joint_topics)} (--key given again takes one)"]
         notes = notes * bool(joint_topics)
         if unknown:
@@ -146,7 +147,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
                 "out with --leave-out"
             )
         if kind == _STATE:
-            there = (beside, notes, moving)
+            there = (beside, notes, elsewhere)
             yield name, partial(_states, bag, name, messages, options, *there)
             continue
         for index, message in enumerate(messages):
@@ -215,26 +216,24 @@ def _fields(message: Any, path: str = "") -> Iterator[tuple[str, Any]]:
             yield from _fields(value, f"{path}/{name}")
 
 
-def _moving(topic: str, messages: Sequence[Message]) -> dict[str, tuple[float, float]]:
-    """The range of the only number, or list of numbers, of a topic that moves; none of several.
+def _beside(topic: str, messages: Sequence[Message]) -> dict[str, Beside]:
+    """The numbers of a topic; what moves is the only one, or only list of numbers, that does.
 
-    Several in one message are mostly a pose, or what a driver says of itself; but a base's pose is
-    named as one.
+    Several in one message are mostly a pose, or what a driver says of itself; but where a base
+    stands is named, number by number.
     """
     names = messages[0].content.name if messages else []
     rows = [m.content.position for m in messages]
     if len(rows) < 2 or not names or len({len(row) for row in rows}) > 1:
         return {}
     times = np.array([m.stamp - messages[0].stamp for m in messages]) * 1e-9
-    groups = vectors(names) if len(names) > 1 else {}
-    grouped = {i for group in groups.values() for i in group}
-    groups |= {name: [i] for i, name in enumerate(names) if i not in grouped}
-    fields = {name: np.array(rows)[:, group] for name, group in groups.items()}
-    found = moves_beside(np.zeros((len(rows), 1)), fields, times)
-    if found and is_of_base(topic):
-        ends = np.array([*found.values()])
-        return {topic: (float(ends.min()), float(ends.max()))}
-    return found if len(found) == 1 else {}
+    found = columns_beside(names, np.array(rows), (), times)
+    moving = {own.moving for own in found.values()} - {""}
+    if is_of_base(topic):
+        moving = {*filter(is_of_base, moving)}
+    elif len(moving) > 1:
+        moving = set()
+    return {n: b if b.moving in moving else b._replace(moving="") for n, b in found.items()}
 
 
 def _messages(reader: Any, connections: Sequence[Any]) -> list[Message]:
@@ -273,7 +272,7 @@ def _states(
     options: ReadOptions,
     beside: Sequence[list[Message]],
     notes: Sequence[str],
-    moving: Mapping[str, tuple[float, float]],
+    elsewhere: Mapping[str, Beside],
 ) -> Recording:
     """One episode of JointStates of one publisher.
 
@@ -320,7 +319,7 @@ def _states(
     sent = [stamp.sec * 10**9 + stamp.nanosec for stamp in header]
     times, source, said = _clock_of(bag, sent, came, options.time_column)
     clock = options.clock(name, len(kept), stamps=times, name=source, unit="ns")
-    return recorded(name, clock, positions, names, remarks=(*remarks, *said), left_out=moving)
+    return recorded(name, clock, positions, names, remarks=(*remarks, *said), beside=elsewhere)
 
 
 def _of_one_publisher(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import columns_beside
+from prior_reinforce.arm.recordings.beside import columns_beside, moving_beside
 from prior_reinforce.arm.recordings.channels import Kind, kinds, measured_of, one_for_all
 from prior_reinforce.arm.recordings.judging import UNIT, Given, Judge, beliefs_of
 from prior_reinforce.arm.recordings.naming import (
@@ -120,6 +120,7 @@ def select(
         questions = [*unsaid, *differ, *questions]
     recorded, wanted = judge.recorded(), tuple(belief.wanted for belief in beliefs)
     scale = [conversion(*each) for each in zip(recorded, wanted, names, strict=True)]
+    left_out = [f"{n}, {low:.4g} to {high:.4g}" for n, (low, high) in moving_beside(picked).items()]
     return Selection(
         tuple(replace(r, positions=r.positions * scale, units=wanted) for r in takes),
         names,
@@ -128,7 +129,7 @@ def select(
         (*guessed, *questions),
         (*mixed, *remarks),
         other,
-        _left_out(recordings, columns),
+        listed(left_out, "; "),
     )
 
 
@@ -216,15 +217,12 @@ def _picked(recording: Recording, columns: list[int], joints: tuple[str, ...]) -
             )
         count = "frame is" if lost.sum() == 1 else "frames are"
         remarks += (f"{what}; {lost.sum()} {count} left out, as lost packets are",)
-    beside = dict(recording.beside)
-    for i in {*range(len(recording.names))} - {*columns}:
-        values, unit = recording.positions[:, i], recording.units[i]
-        if np.any(np.isfinite(values)):
-            name = recording.columns[i] + (f" [{unit}]" if unit else "")
-            beside[name] = float(np.nanmin(values)), float(np.nanmax(values))
+    units = zip(recording.columns, recording.units, strict=True)
+    names = [name + (f" [{unit}]" if unit else "") for name, unit in units]
+    beside = columns_beside(names, recording.positions, columns, recording.times)
     return replace(
         recording,
-        beside=beside,
+        beside={**recording.beside, **beside},
         times=recording.times[~lost],
         positions=positions[~lost],
         names=joints,
@@ -232,17 +230,3 @@ def _picked(recording: Recording, columns: list[int], joints: tuple[str, ...]) -
         columns=called,
         remarks=remarks,
     )
-
-
-def _left_out(recordings: Sequence[Recording], columns: Sequence[list[int]]) -> str:
-    """Channels that move and are not selected, with their ranges over all recordings."""
-    ranges: dict[str, list[tuple[float, float]]] = {}
-    for recording, taken in zip(recordings, columns, strict=True):
-        beside = columns_beside(recording.columns, recording.positions, taken, recording.times)
-        for name, span in (*recording.left_out.items(), *beside.items()):
-            ranges.setdefault(name, []).append(span)
-    said = [
-        f"{name}, {min(low for low, _ in spans):.4g} to {max(high for _, high in spans):.4g}"
-        for name, spans in ranges.items()
-    ]
-    return listed(said, "; ")

@@ -9,11 +9,9 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float
 
-from prior_reinforce.arm.recordings.outcomes import Outcomes, missing_outcomes, outcomes_of
 from prior_reinforce.arm.recordings.recording import Recording
-from prior_reinforce.arm.recordings.selection import Selection
 from prior_reinforce.arm.recordings.units import listed
-from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.arrays import Plans
 
 _APART, _AGAINST = 2.0, 0.5
 """Ranges of its motion by which a channel's starts in two groups of takes may lie apart, and that
@@ -24,7 +22,7 @@ _LEAST = {"rad": 0.1, "m": 0.02, "percent": 5.0}
 _WITHIN = 0.2
 """Part of the gap between two groups by which starts within one may differ. Ours."""
 _BACK = 0.1
-"""Part of its range that a joint may be off where a motion goes back to another's start (ours)."""
+"""Part of its range that a joint may be off where a motion goes back to a start. Ours."""
 
 
 def odd_starts(
@@ -81,22 +79,22 @@ def ways_back(recordings: Sequence[Recording]) -> str:
 
 def _goes_back(before: Recording, motion: Recording) -> bool:
     """Whether a motion goes from where the one before it ended to where that began."""
-    near = _BACK * np.ptp(np.vstack([before.positions, motion.positions]), axis=0)
+    ranges = np.ptp(np.vstack([before.positions, motion.positions]), axis=0)
     (began, ended), (begins, ends) = (each.positions[[0, -1]] for each in (before, motion))
-    there = np.all(np.abs([ends - began, begins - ended]) <= np.maximum(near, 1e-12))
-    return bool(there and np.any(np.abs(ends - begins) > near))
+    there = _is_at(ends, began, ranges) and _is_at(begins, ended, ranges)
+    return there and not _is_at(ends, begins, ranges)
 
 
-def check_outcomes(selection: Selection, outcomes: Outcomes) -> None:
-    """Check that each episode has an outcome.
+def all_return(plans: Plans) -> str:
+    """Say it if every motion ends where it began: each may hold a way back; else empty."""
+    if not _is_at(plans[:, -1], plans[:, 0], np.ptp(plans, axis=1)):
+        return ""
+    return (
+        "every motion ends where it began: if it rests before it goes back, cut it there "
+        "(--rests 0.3), and leave the way back out"
+    )
 
-    Raises:
-        InvalidDemonstrationsError: As in `outcomes_of`; ways back among them are named.
-    """
-    try:
-        outcomes_of(selection.episodes, outcomes)
-    except InvalidDemonstrationsError as error:
-        back = ways_back(selection.recordings)
-        if back and missing_outcomes(selection.episodes, outcomes):
-            raise InvalidDemonstrationsError(f"{error}; {back}") from error
-        raise
+
+def _is_at(pose: np.ndarray, other: np.ndarray, ranges: np.ndarray) -> bool:
+    """Whether every joint is where it is in another pose, but for a part of its range."""
+    return bool(np.all(np.abs(pose - other) <= np.maximum(_BACK * ranges, 1e-12)))

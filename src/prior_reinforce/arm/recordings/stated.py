@@ -15,19 +15,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import MASK, Arrays, moves_beside
+from prior_reinforce.arm.recordings.beside import MASK, Arrays, arrays_beside
 from prior_reinforce.arm.recordings.bounds import check_names
 from prior_reinforce.arm.recordings.channels import Kind, kinds, one_for_all
 from prior_reinforce.arm.recordings.clock import (
-    NO_COLUMN,
-    SAME_RATE,
     Clock,
     clock_among,
-    declared_rate,
     rises,
     says_time,
 )
-from prior_reinforce.arm.recordings.naming import Texts, missing_channels, said_in
+from prior_reinforce.arm.recordings.naming import OTHER_NAMES, Texts, missing_channels, said_in
 from prior_reinforce.arm.recordings.recording import Positions, Recording, recorded, without_units
 from prior_reinforce.arm.recordings.tables import Table
 from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, Ambiguity, known_unit, say_names
@@ -38,7 +35,6 @@ if TYPE_CHECKING:
     from prior_reinforce.arm.recordings.options import ReadOptions
 
 _NAMES = re.compile(r"name|joint|dof|motor|actuator|channel|column|label|ax[ei]s", re.IGNORECASE)
-_OTHER_NAMES = re.compile(r"link|body|bodies|camera|task|object|site|sensor|frame", re.IGNORECASE)
 _FRAMES = re.compile(
     r"lengths?|(n|num)_?(frames|steps|samples)|(episode|traj|trajectory|sequence)_(len|lengths?)"
 )
@@ -69,24 +65,16 @@ def recorded_among(
     """
     count = len(arrays[keys[0]])
     stated = stated or {}
-    stated = stated if options.time_column else with_rate(where, stated, options.rate)
     kept, why = frames_said(f"{where}: {episode}", keys[0], {**stated, **arrays}, count)
     arrays = {n: a[:kept] if a.shape[:1] == (count,) else a for n, a in arrays.items()}
     positions, known = joined(where, keys, arrays, texts, options.joints)
     bare, units = without_units(names or known)
     said = units_said(texts, bare or ("",) * positions.shape[1])
     units = tuple(a or b for a, b in zip(said, units or (None,) * len(said), strict=False))
-    if clock is None:
-        declared = None if options.time_column == NO_COLUMN else stated
-        clock = clock_among(where, episode, kept, arrays, options, declared)
+    clock = clock or clock_among(where, episode, kept, arrays, options, stated)
     others = {name: array for name, array in arrays.items() if name not in keys}
     called = (*keys, *(names or known))
-    more = {"left_out": moves_beside(positions, others, clock.times, called)} | more
-    more["beside"] = {
-        name: (float(np.nanmin(own)), float(np.nanmax(own)))
-        for name, own in others.items()
-        if own.ndim == 1 and own.dtype.kind in "biuf" and np.any(np.isfinite(own))
-    }
+    more["beside"] = arrays_beside(positions, others, clock.times, called)
     more["remarks"] = (*more.get("remarks", ()), *why)
     if not bare:
         unclear = _other_names(episode, texts, positions.shape[1], options.joints or ())
@@ -166,7 +154,7 @@ def names_said(
         if not all(known_unit(word) for word in own)
     }
     sure = {k: own for k, own in fit.items() if len(missing_channels(wanted, own)) < len(wanted)}
-    called = {k: own for k, own in fit.items() if _NAMES.search(k) and not _OTHER_NAMES.search(k)}
+    called = {k: own for k, own in fit.items() if _NAMES.search(k) and not OTHER_NAMES.search(k)}
     found = {own: key for key, own in (sure or called).items()}
     if len(found) > 1:
         each = "; ".join(f"{key} says {say_names(own)}" for own, key in found.items())
@@ -184,7 +172,7 @@ def units_said(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
     for key, own in texts.items():
         if "unit" not in key.lower() or says_time(key) or len(own) not in (1, len(names)):
             continue
-        if "." in key and (_OTHER_NAMES.search(key) or not _UNIT.fullmatch(key.split(".")[-1])):
+        if "." in key and (OTHER_NAMES.search(key) or not _UNIT.fullmatch(key.split(".")[-1])):
             continue
         units = [unit if unit in CHANNEL_UNITS else None for unit in map(known_unit, own)]
         if len(own) == 1 and units[0] is not None:
@@ -192,33 +180,6 @@ def units_said(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
         if any(units):
             return tuple(units)
     return (None,) * len(names)
-
-
-def with_rate(
-    where: object, stated: Mapping[str, Any], given: float | None = None
-) -> dict[str, Any]:
-    """Return a file's numbers, and by its bare name the rate among those deep in it: `meta.fps`.
-
-    FileFormatError where it states two, and none is given.
-    """
-    split = {name: name.rpartition(".") for name in stated}
-    places = {n: bare for n, (at, _, bare) in split.items() if not _OTHER_NAMES.search(at)}
-    rates = {
-        name: declared_rate(where, {bare: stated[name]})["own_rate"]
-        for name, bare in places.items()
-        if ("." in name or np.size(stated[name]) == 1)
-        and declared_rate(where, {bare: stated[name]})
-    }
-    deep = [name for name in rates if "." in name]
-    for name, rate in rates.items():
-        first, of_first = next(iter(rates.items()))
-        if deep and given is None and abs(rate - of_first) > SAME_RATE * of_first:
-            raise FileFormatError(
-                f"{where}: {first} says {of_first:.4g} frames a second, but {name} {rate:.4g}; "
-                "take one: --rate"
-            )
-    own = {places[name]: stated[name] for name in deep[:1] if len(rates) == len(deep)}
-    return {**stated, **own}
 
 
 def headed(table: Table, joints: Sequence[str] | None = None) -> Table:

@@ -57,7 +57,7 @@ from prior_reinforce.session.trials import Goal, Trial
 from prior_reinforce.wording import as_html
 
 if TYPE_CHECKING:
-    from prior_reinforce.arm.recordings import ImportResult, Preprocessing
+    from prior_reinforce.arm.recordings import ImportResult, Preprocessing, Wanted
     from prior_reinforce.arm.robots.report import LimitReport
     from prior_reinforce.generators.base import FitProgress, Generator
 
@@ -318,29 +318,37 @@ class Workspace:
             InvalidDemonstrationsError, UnclearUnitsError, FileFormatError: As it says there.
             TrialStateError: A trial waits to be told.
         """
-        from prior_reinforce.arm.recordings import Preprocessing, import_demonstrations
+        from prior_reinforce.arm.recordings import import_demonstrations
 
         self.state.refuse_open_trial("importing demonstrations")
-        manifest, form = self.manifest, self.manifest.format
-        if form.names != UNKNOWN:
-            meant = {"names": form.names, "plan_units": form.units}
-            options = {"joints": form.names, **options, **meant}
+        wanted = self.wanted(preprocessing, append=append)
         result = import_demonstrations(
             source,
             outcomes=outcomes,
-            outcome_names=manifest.outcome_format.names,
-            outcome_units=manifest.outcome_format.units,
             outcome_unit=outcome_unit,
-            preprocessing=dataclasses.replace(preprocessing or Preprocessing(), dt=form.dt),
-            robot=manifest.robot,
-            gate=manifest.gate,
             take_guesses=take_guesses,
-            declared=manifest.declared,
-            before=self.demonstrations if append else None,
-            **options,
+            **{"joints": wanted.names, **options, **vars(wanted)},
         )
         self.take_in(result, str(source), append=append)
         return result
+
+    def wanted(self, preprocessing: Preprocessing | None = None, *, append: bool = False) -> Wanted:
+        """Return what recordings are to become here; the time step is the manifest's."""
+        from prior_reinforce.arm.recordings import Preprocessing, Wanted
+
+        manifest, form = self.manifest, self.manifest.format
+        is_known = form.names != UNKNOWN
+        return Wanted(
+            form.names if is_known else None,
+            form.units if is_known else None,
+            manifest.outcome_format.names,
+            manifest.outcome_format.units,
+            dataclasses.replace(preprocessing or Preprocessing(), dt=form.dt),
+            manifest.robot,
+            manifest.gate,
+            manifest.declared,
+            self.demonstrations if append else None,
+        )
 
     def take_in(self, result: ImportResult, source: str, *, append: bool = False) -> int:
         """Take in what an import made, in place of earlier demonstrations or beside them.
