@@ -142,12 +142,14 @@ def test_a_command_beside_what_was_measured_is_asked_about(tmp_path):
         (("leader", "follower"), "--key follower"),
         (("one", "other"), "--key WHICH"),
         (("target_q", "actual_q"), "--key actual_q"),
+        (("state.q_d", "state.q"), "--key state.q"),
     ],
 )
 def test_what_was_measured_is_told_by_words_of_commands_and_measurements(names, option):
     both = np.hstack([Q, np.vstack([Q[:1], Q[:1], Q[:-2]])])
     columns = [f"{name}_{i}" for name in names for i in range(3)]
-    (asked,) = twin_vectors([*columns, "width"], np.column_stack([both, S]))
+    columns += [*(f"velocity_{i}" for i in range(3)), "width"]  # other vectors are no single column
+    (asked,) = twin_vectors(columns, np.column_stack([both, np.gradient(Q, axis=0), S]))
     assert asked.option == f"{option} --key width"
     assert not asked.guessed
 

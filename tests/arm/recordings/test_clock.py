@@ -89,6 +89,9 @@ def test_a_column_that_counts_frames_needs_the_rate():
         clock_of("a", 3, stamps=np.array([7, 8, 10]), name="t", time_unit="frame")
     (doubt,) = clock_of("a", 3, stamps=np.array([7, 8, 9]), name="t").ambiguities
     assert "or it counts frames" in doubt.what
+    # What is not even called a time more probably counts.
+    (doubt,) = clock_of("a", 3, stamps=np.array([7, 8, 9]), name="X").ambiguities
+    assert (doubt.option, doubt.guessed) == ("--time-unit frame --rate HZ", False)
 
 
 def test_a_rate_that_disagrees_with_the_times_is_refused_and_one_that_agrees_is_not():

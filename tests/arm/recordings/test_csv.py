@@ -107,7 +107,7 @@ def test_a_numbered_group_keeps_what_its_columns_are_called(tmp_path):
         header = ",".join(["t", *(f"q{k}" for k in range(7)), *(f"tau{k}" for k in range(7))])
         np.savetxt(tmp_path / f"{i}.csv", rows, delimiter=",", header=header, comments="")
     recording = read_recordings(tmp_path, key="q")[0]
-    assert recording.names == JOINTS
+    assert (recording.names, recording.named) == (tuple(f"column{k}" for k in range(1, 8)), False)
     assert recording.columns == tuple(f"q{k}" for k in range(7))
 
 
@@ -380,3 +380,59 @@ def test_a_rate_with_a_decimal_comma_in_a_comment_is_not_cut(tmp_path):
     (tmp_path / "a.csv").write_text("\n".join(["# fps: 40, joints: 7", ",".join(JOINTS), *rows]))
     (read,) = read_recordings(tmp_path / "a.csv")
     assert read.period == pytest.approx(1 / 40)
+
+
+def test_what_ros2_topic_echo_writes_has_the_joints_that_its_cells_name(tmp_path):
+    for frame in ("", "base_link"):
+        rows = [
+            f"1714557600,{k * 10_000_000},{frame},elbow,pan,{k / 10},{-k / 10},0.0,0.0,0.0,0.0"
+            for k in range(6)
+        ]
+        (tmp_path / "a.csv").write_text("\n".join(rows))
+        (read,) = read_recordings(tmp_path / "a.csv", joints=["pan", "elbow"])
+        np.testing.assert_allclose(read.times, np.arange(6) * 0.01)
+        by_name = dict(zip(read.names, read.positions.T, strict=True))
+        np.testing.assert_allclose(by_name["elbow"], np.arange(6) / 10)
+        np.testing.assert_allclose(by_name["pan"], -np.arange(6) / 10)
+
+
+def test_names_of_several_levels_as_pandas_writes_them(tmp_path):
+    t = np.arange(8) * 0.01
+    columns = pd.MultiIndex.from_product([["pan", "lift"], ["position", "velocity"]])
+    numbers = np.outer(np.arange(8), [1.0, 10.0, 2.0, 20.0])
+    frame = pd.DataFrame(numbers, columns=columns, index=pd.Index(t, name="time"))
+    frame.to_csv(tmp_path / "a.csv")
+    (read,) = read_recordings(tmp_path / "a.csv", joints=["lift", "pan"])
+    np.testing.assert_allclose(read.times, t)
+    by_name = dict(zip(read.names, read.positions.T, strict=True))
+    np.testing.assert_allclose(by_name["lift/position"], numbers[:, 2])
+
+
+def test_rows_of_another_log_that_was_merged_are_left_out(tmp_path):
+    lines = ["time,pan,lift,force"]
+    for k in range(20):
+        lines += [f"{k / 100},{k},{-k},", f"{k / 100 + 0.003},,,5.0"]
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    (read,) = read_recordings(tmp_path / "a.csv", joints=["pan", "lift"])
+    np.testing.assert_allclose(read.times, np.arange(20) / 100)
+    assert "20 rows left out, in which no joint has a value" in read.remarks[0]
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "says"),
+    [
+        ("time,joint,position", "{t},{name},{k}", "each row is of one joint, which joint names"),
+        ("time,pan,lift", "{t},{k},False", "lift holds 'False' and no numbers"),
+    ],
+)
+def test_joints_in_cells_and_switches_in_words_are_told_as_such(tmp_path, head, row, says):
+    lines = [row.format(t=k // 2 / 10, k=k, name=("pan", "lift")[k % 2]) for k in range(20)]
+    (tmp_path / "a.csv").write_text("\n".join([head, *lines]))
+    with pytest.raises(FileFormatError, match=says):
+        read_recordings(tmp_path / "a.csv", joints=["pan", "lift"])
+
+
+def test_hidden_files_beside_recordings_are_none(tmp_path):
+    write_csv(tmp_path)
+    (tmp_path / "._0.csv").write_bytes(b"\0\5\26\7")
+    assert len(read_recordings(tmp_path)) == N

@@ -92,3 +92,10 @@ def test_a_gripper_of_another_range_is_told_how_to_say_it():
     assert "'0.1 percent' if its range is 0 to 1000" in asked.what
     found = select(takes(names, (1, 900)), names, names, ["rad", "0.1 percent"], plan)
     assert max(r.positions[:, 1].max() for r in found.recordings) == 90
+
+
+def test_a_unit_of_two_words_is_one_word_of_the_command_that_is_printed():
+    """Joints in rad beside one that was said in hundredths of a degree, and a gripper unsaid."""
+    ends = (0.4, -1.6, 220)
+    told = select(takes(("j1", "j2", "robotiq_pos"), ends, units=[("0.01 deg", None, None)]))
+    assert {one.option for one in told.ambiguities} == {"--units '0.01 deg' rad UNIT"}

@@ -248,8 +248,8 @@ def test_three_numbers_of_a_place_are_called_by_their_key(tmp_path):
     ("keys", "names"),
     [
         (("tcp",), "tcp_x tcp_y tcp_z"),
-        (("positions", "gripper"), "joint1 joint2 joint3 gripper"),
-        (("hand_joints", "gripper"), "joint1 joint2 joint3 gripper"),
+        (("positions", "gripper"), "positions_0 positions_1 positions_2 gripper"),
+        (("hand_joints", "gripper"), "hand_joints_0 hand_joints_1 hand_joints_2 gripper"),
     ],
 )
 def test_three_numbers_that_may_be_joints_are_no_place(tmp_path, keys, names):

@@ -129,7 +129,7 @@ def test_a_gripper_step_does_not_ring():
     np.testing.assert_allclose(
         done.plans[0, :, 0], np.sin(np.arange(done.plans.shape[1]) * 0.01), atol=1e-5
     )
-    assert "all: joint2 jumps; no spline goes through it" in done.remarks
+    assert "all: column2 jumps; no spline goes through it" in done.remarks
 
 
 def test_a_horizon_holds_the_last_pose_and_never_cuts():
@@ -144,7 +144,7 @@ def test_a_horizon_holds_the_last_pose_and_never_cuts():
 def test_an_end_in_mid_swing_is_remarked():
     cut = [recording(*(part[: 100 + 10 * i] for part in sampled(i, 100)), str(i)) for i in range(2)]
     done = preprocess(cut, UNITS, Preprocessing())
-    moving = "(joint1 to joint2, joint4 to joint6)"
+    moving = "(column1 to column2, column4 to column6)"
     assert done.remarks == (
         f"0: ends in motion, then holds its last pose {moving}",
         f"1: ends in motion {moving}",
@@ -157,7 +157,7 @@ def test_a_start_in_mid_swing_is_remarked():
         t, q = sampled(i, 100)
         cut.append(recording(t[60:], q[60:], str(i)))
     assert preprocess(cut, UNITS, Preprocessing()).remarks == (
-        "all: starts in motion (joint1 to joint2, joint4 to joint6)",
+        "all: starts in motion (column1 to column2, column4 to column6)",
     )
 
 
@@ -353,7 +353,7 @@ def test_degrees_that_nobody_names_are_refused_until_said(tmp_path):
     folder = degrees(tmp_path)
     with pytest.raises(UnclearUnitsError) as caught:
         import_demonstrations(folder)
-    assert "joint1 to joint7 in rad would reach 167.6 (joint6 of throw_5)" in str(caught.value)
+    assert "column1 to column7 in rad would reach 167.6 (column6 of throw_5)" in str(caught.value)
     assert caught.value.options == "--units deg"
     for said in ({"units": ["deg"]}, {"take_guesses": True}):
         plans = import_demonstrations(folder, preprocessing=AS_IS, **said).demonstrations.plans
@@ -363,7 +363,7 @@ def test_degrees_that_nobody_names_are_refused_until_said(tmp_path):
 def test_a_unit_that_cannot_be_is_refused_whoever_says_it(tmp_path):
     with pytest.raises(UnclearUnitsError) as caught:
         import_demonstrations(degrees(tmp_path), units=["rad"])
-    assert "in rad, as --units says, would reach 167.6 (joint6 of throw_5)" in str(caught.value)
+    assert "in rad, as --units says, would reach 167.6 (column6 of throw_5)" in str(caught.value)
     assert caught.value.options == "--units deg"
 
 
@@ -377,7 +377,8 @@ def test_what_no_arm_does_but_some_joint_could_is_the_first_remark(tmp_path):
         warnings.simplefilter("error")
         preview = import_demonstrations(tmp_path, outcomes=outcomes, units=["rad"]).preview
     assert preview.remarks[0] == (
-        "joint6 of 1 reaches 10.98 rad, and arms do not: if it was recorded in deg, say --units deg"
+        "column6 of 1 reaches 10.98 rad, and arms do not: if it was recorded in deg, say "
+        "--units deg"
     )
 
 
@@ -499,8 +500,10 @@ def test_columns_without_names(tmp_path):
     np.savez(tmp_path / "all.npz", q=plans, rate=20)
     options = {"outcomes": OUTCOMES, "preprocessing": Preprocessing(trim=False)}
     made_up = import_demonstrations(tmp_path / "all.npz", **options).demonstrations
-    assert made_up.format.names == ("joint1", "joint2", "joint3")
+    assert made_up.format.names == ("column1", "column2", "column3")
     named = import_demonstrations(tmp_path / "all.npz", joints="xyz", **options).demonstrations
     assert named.format.names == ("x", "y", "z")
-    with pytest.raises(InvalidDemonstrationsError, match="3 columns without names, but 2"):
+    with pytest.raises(
+        InvalidDemonstrationsError, match="3 columns without names, and the plan 2 joints"
+    ):
         import_demonstrations(tmp_path / "all.npz", joints="xy", **options)

@@ -25,7 +25,7 @@ def test_what_was_recorded_is_copied_and_starts_at_zero():
     times[:], positions[:] = 0, 0
     np.testing.assert_allclose(recording.times, [0, 0.1, 0.3])
     np.testing.assert_array_equal(recording.positions, [[0, 1], [2, 3], [4, 5]])
-    assert (recording.names, recording.named) == (("joint1", "joint2"), False)
+    assert (recording.names, recording.named) == (("column1", "column2"), False)
     assert Recording("a", [0, 1], positions[:2], ("x", "y")).named
     assert recording.period == pytest.approx(0.15)
 

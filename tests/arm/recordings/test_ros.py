@@ -313,3 +313,14 @@ def test_a_base_that_drives_is_named_whatever_its_message(tmp_path):
     (read,) = read_recordings(tmp_path / "bag")
     driven = {"/base_pose/pose/position/x": (0.0, pytest.approx(0.3 * t[-1]))}
     assert moving_beside([read]) == driven
+
+
+def test_a_bag_without_joints_is_told_by_what_it_has(tmp_path):
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    kind = "std_msgs/msg/Float64"
+    with Writer2(tmp_path / "bag", version=8, storage_plugin=StoragePlugin.MCAP) as bag:
+        topic = bag.add_connection("/force", kind, typestore=store)
+        message = store.types[kind](data=1.0)
+        bag.write(topic, 1, store.serialize_cdr(message, kind))
+    with pytest.raises(FileFormatError, match=r"it has /force \(std_msgs/msg/Float64\): write"):
+        read_recordings(tmp_path / "bag")

@@ -72,3 +72,18 @@ def test_a_place_is_not_taken_for_joints_of_a_robot():
     assert select(some).units == ("m",) * 3 + ("rad",) * 3
     with pytest.raises(InvalidDemonstrationsError, match="rz, a place and no joints: name what"):
         select(some, [f"j{i}" for i in range(1, 7)])
+
+
+def test_columns_without_names_are_no_joint_whatever_the_plans_are_called():
+    """An arm of joint1 and joint2 behind a gripper, or beside another arm."""
+    q = np.column_stack([np.full(100, 0.08), np.sin(T), np.cos(T)])
+    joints = ("joint1", "joint2")
+    with pytest.raises(InvalidDemonstrationsError, match="3 columns without names, and the plan 2"):
+        select([Recording("throw", T, q)], names=joints, joints=joints)
+    for said in (["gripper", "joint1", "joint2"], ["column2", "column3"]):
+        (taken,) = select([Recording("throw", T, q)], said, joints).recordings
+        np.testing.assert_array_equal(taken.positions, q[:, 1:])
+    several = ["mm", "deg", "rad"]
+    found = select([Recording("throw", T, q)], ["gripper", "joint2", "joint1"], joints, several)
+    assert found.recorded_units == ("rad", "deg")
+    np.testing.assert_array_equal(found.recordings[0].positions[:, 0], q[:, 2])

@@ -208,3 +208,9 @@ def test_whole_numbers_with_blanks_between_are_no_number(tmp_path):
     table = read_table(path)
     with pytest.raises(FileFormatError, match="'100 200 300', expected a number"):
         table.numbers(1)
+
+
+def test_a_time_of_day_goes_on_at_midnight(tmp_path):
+    (tmp_path / "a.csv").write_text("clock,a\n23:59:59.5,1\n00:00:00,2\n00:00:00.5,3\n")
+    times = read_table(tmp_path / "a.csv").stamps(0)
+    np.testing.assert_array_equal(times, [0, 5e8, 1e9])

@@ -156,7 +156,8 @@ def twin_vectors(names: Sequence[str], values: Positions) -> Iterator[Ambiguity]
         if alike and _follows(values[:, own], values[:, of_other]):
             measured = measured_of([one, other])
             seen = f"it looks as if {measured} were measured" if measured else "name what was"
-            single = [name for i, name in enumerate(names) if i not in (*own, *of_other)]
+            in_vectors = {i for group in vectors(names).values() for i in group}
+            single = [name for i, name in enumerate(names) if i not in in_vectors]
             keys = " ".join(f"--key {shlex.quote(key)}" for key in (measured or "WHICH", *single))
             what = f"{other} repeats {one}, as a command does: {seen}"
             yield Ambiguity(what, keys, guessed=False)

@@ -85,7 +85,7 @@ _OPENING = re.compile(
 """Names of a gripper's opening: the only one, `gripper_width`, is the plan's `gripper`."""
 _COMMANDED = re.compile(
     r"(^|[^a-z])(cmd|command(ed)?|actions?|target|des(ired)?|ref(erence)?|goal|set(point)?|leader"
-    r"|soll)($|[^a-z])",
+    r"|soll|(?<=q_)d)($|[^a-z])",
     re.IGNORECASE,
 )
 _MEASURED = re.compile(

@@ -378,8 +378,10 @@ def _judge(
     if looks is None:
         return "s", (Ambiguity(f"{what}and no other unit fits better", "--time-unit s"),)
     what += f"in {looks} {rate_in(looks)}: it looks like {looks}"
-    if said is None and period == 1 and COUNTER.search(name.lower()):
+    is_counter = COUNTER.search(name.lower()) is not None
+    if said is None and period == 1 and (is_counter or not says_time(name)):
         what = f"{name} counts frames, and nothing says how many a second are"
+        what += f" (or it is a time: --time-unit {looks})" * (not is_counter)
         return "s", (Ambiguity(what, "--time-unit frame --rate HZ", guessed=False),)
     if said is None and period == 1:
         what += " (or it counts frames: --time-unit frame --rate HZ)"

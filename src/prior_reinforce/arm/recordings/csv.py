@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -15,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from prior_reinforce.arm.recordings.beside import columns_beside, twin_vectors
+from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.clock import NO_COLUMN
 from prior_reinforce.arm.recordings.naming import find_channels, numbered_like, vectors, words
 from prior_reinforce.arm.recordings.options import ReadOptions
@@ -61,6 +63,11 @@ class LogFormat(NamedTuple):
     time_unit: str
 
 
+_MERGED = 0.2
+"""Share of rows without a value of any joint from which these are of another log. Ours: what a
+recorder lost is less, and is not left out."""
+_ECHOED = ("name", "position", "velocity", "effort")
+"""Arrays of a sensor_msgs/JointState, in order."""
 LOG_FORMATS = (
     # libfranka, src/log.cpp: logToCSV writes time.toMSec(). First 0.9.2 and later, then of 2017.
     LogFormat("libfranka's log", ("time", "success_rate", "state.q[0]"), "state.q", "ms"),
@@ -78,7 +85,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             yield path.stem, unread
             continue
         table = headed(read_table(path, options.delimiter, options.decimal), options.joints)
-        table = with_whole_dates(table)
+        table = with_whole_dates(_with_heads_of_echo(_with_one_head(table)))
         said = said_above(path)
         if not table.names or len(table) < 2:
             raise FileFormatError(
@@ -168,6 +175,15 @@ def _episode(
     aside = {*times.columns, *times.held, episode_column, *told}
     others = [i for i in range(len(names)) if i not in aside]
     channels, named = list(others), table.named
+    _refuse_text(table, joints or (), names, found or ())
+    blank = [not any(table.cells[i][row] for i in found or ()) for row in range(len(table))]
+    if found and _MERGED <= np.mean(blank) < 1:
+        own = [row for row in range(len(table)) if not blank[row]]
+        remark = f"{sum(blank)} rows left out, in which no joint has a value, as of a merged log"
+        said_of_all = (*said_of_all, remark)
+        return _episode(
+            table.rows(own), episode, options, episode_column, guessed, above, said_of_all
+        )
     if found and not options.key and {*found} <= {*others}:
         channels = found
     elif table.named and (keys := options.key or ((log.key,) if log else ())):
@@ -190,15 +206,18 @@ def _episode(
         remarks += [f"{say_names([called[i] for i in left])} left out, which {why}"] * bool(left)
     twins = all_read and twin_vectors([called[i] for i in channels], table.values[:, channels])
     own, units = without_units([called[i] for i in channels])
+    is_named = named or said.keys() >= {*channels}
+    own_names = [said.get(i, name) for i, name in zip(channels, own, strict=True)]
+    if not is_named:  # by their places in the file
+        own_names = [] if table.named else [f"column{i + 1}" for i in channels]
     unnamed = [i for i in counts if is_unnamed(table.names[i])]
     rest = [i for i in others if i not in channels and i not in unnamed]
     return recorded(
         episode,
         clock,
         table.columns(channels),
-        tuple(said.get(i, name) for i, name in zip(channels, own, strict=True))
-        if named or said.keys() >= {*channels}
-        else (),
+        tuple(own_names),
+        named=is_named,
         remarks=tuple(remarks),
         units=tuple(table.units[i] or u for i, u in zip(channels, units, strict=True)),
         ambiguities=(*guessed, *times.guessed, *clock.ambiguities, *(twins or ())),
@@ -210,6 +229,59 @@ def _episode(
             clock.times,
         ),
     )
+
+
+def _with_one_head(table: Table) -> Table:
+    """Join further lines of names, as pandas writes of columns of several levels: `elbow/position`.
+
+    Such lines hold no number, and the line after them does.
+    """
+    are_numbers = ~np.isnan(table.values)
+    rows = int(np.argmax(are_numbers.any(axis=1))) if table.named and are_numbers.size else 0
+    if rows == 0:
+        return table
+    levels = [[name, *own[:rows]] for name, own in zip(table.names, table.cells, strict=True)]
+    names = tuple("/".join(filter(None, level)) for level in levels)
+    return replace(table.rows(range(rows, len(table))), names=names)
+
+
+def _with_heads_of_echo(table: Table) -> Table:
+    """Give heads to what `ros2 topic echo --csv` writes of a JointState; return others as they are.
+
+    A row is the stamp in s and ns, the frame's name, the joints' names, and as many positions;
+    then velocities and efforts, if there are any.
+    """
+    texts = [i for i in range(len(table.names)) if table.is_text(i)]
+    if table.named or not texts or not all(map(table.is_number, (0, 1))):
+        return table
+    joints = texts[table.names[texts[0]] == "column 3" :]  # an empty name is no column
+    groups, rest = divmod(len(table.names) - 1 - texts[-1], max(len(joints), 1))
+    if texts != [*range(2, texts[-1] + 1)] or rest or not 1 <= groups <= 3:
+        return table
+    heads = [f"{of}{i}" for of in _ECHOED[: 1 + groups] for i in range(len(joints))]
+    frame = ["frame_id"] * (len(texts) - len(joints))
+    return replace(table, names=("sec", "nanosec", *frame, *heads), named=True)
+
+
+def _refuse_text(
+    table: Table, joints: Sequence[str], names: Sequence[str], found: Sequence[int]
+) -> None:
+    """FileFormatError if joints are texts: names in a column of their own, or `True`, `False`."""
+    opens = Kind.TOOL in kinds(joints)
+    for i, cells in enumerate(table.cells):
+        if joints and {*joints} <= {*cells}:
+            raise FileFormatError(
+                f"{table.where}: each row is of one joint, which {names[i]} names; write a row a "
+                "frame and a column a joint: pandas' DataFrame.pivot(index=TIME, columns="
+                f"{names[i]!r}, values=POSITION)"
+            )
+        is_tool = opens and kinds([names[i]])[0] is Kind.TOOL
+        if (i in found or is_tool) and table.is_text(i) and any(cells):
+            text = next(filter(None, cells))
+            raise FileFormatError(
+                f"{table.where}: {names[i]} holds {text[:20]!r} and no numbers; write 1 and 0, or "
+                "what was measured"
+            )
 
 
 def _names_in_cells(table: Table, options: ReadOptions) -> tuple[dict[int, str], set[int]]:

@@ -410,7 +410,7 @@ def read(source: str | os.PathLike[str], options: ReadOptions | None = None) -> 
             f"{source} holds more than one episode named {', '.join(twice)}; rename their files"
         )
     if not there:
-        raise FileFormatError(f"{source} holds no episode of format {kind}; say its format")
+        raise FileFormatError(f"{source} holds no episode of format {kind}; {_how_to_save()}")
     wanted = there if options.episodes is None else options.episodes
     missing = [e for e in (*wanted, *(options.leave_out or ())) if e not in there]
     if missing or not read_ones:
@@ -419,6 +419,13 @@ def read(source: str | os.PathLike[str], options: ReadOptions | None = None) -> 
         raise InvalidDemonstrationsError(f"{what} in {source}; it has {names}: name those")
     chosen = tuple(read_ones[name] for name in wanted if name in read_ones)
     return Recordings(source, kind, options, chosen, tuple(there))
+
+
+def _how_to_save() -> str:
+    return (
+        "save each episode as CSV (a line of names, a row a frame, the time in a column) or NPZ; "
+        f"what is read is {', '.join(FORMATS)}"
+    )
 
 
 def detect_format(source: Path) -> str:
@@ -437,8 +444,9 @@ def detect_format(source: Path) -> str:
                     f"{source} itself holds no recordings; name {folder}, which looks like "
                     f"{' or '.join(within)}{join}"
                 )
+        if not found:
+            raise FileFormatError(f"{source} holds nothing that can be read; {_how_to_save()}")
         raise FileFormatError(
-            f"{source} looks like {' and '.join(found) or 'no format that can be read'}; say its "
-            f"format, one of {', '.join(FORMATS)}"
+            f"{source} looks like {' and '.join(found)}: say which with --format, or name one file"
         )
     return found[0]

@@ -7,6 +7,7 @@ stated is asked about. What somebody stated is believed where an arm can do it, 
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -30,6 +31,7 @@ _MOST_PERCENT = 110.0
 """Percent of a range; ours: calibrations overshoot by a few."""
 _HARDLY_DEG = 2.0
 """Degrees within which a recorded arm hardly moves. Ours."""
+_OF_COUNTS = " ('0.088 deg' for 4096 counts a turn, their middle subtracted in the file)"
 _NOT_DONE, _HARDLY = "which no arm does", "which is hardly a motion"
 _NORMALISED = (
     ", unless LeRobot recorded shares of each joint's range (-100 to 100, where use_degrees is "
@@ -250,7 +252,7 @@ class Judge:
     def questions(self) -> list[Ambiguity]:
         """Ask about units, one question for what looks alike, all with one option."""
         units = list(self._answers.values())
-        option = f"--units {' '.join(units if len({*units}) > 1 else units[:1])}"
+        option = f"--units {shlex.join(units if len({*units}) > 1 else units[:1])}"
         by = ", as --units says," if self.given else ""
         questions = []
         for unit, doubt, among, worst in self._groups(asked=True):
@@ -258,6 +260,7 @@ class Judge:
             if doubt.looks == UNIT:
                 seen = f"put its unit in the place of {UNIT}"
                 seen += " ('0.1 percent' if its range is 0 to 1000)" * (unit == "percent")
+                seen += _OF_COUNTS * (unit in TURN)
             elif doubt.looks == "deg" and self.normalised and worst.largest <= 100:
                 seen += _NORMALISED
             what = (
@@ -272,7 +275,7 @@ class Judge:
         remarks, other = [], ""
         for unit, (looks, _, _), _, worst in self._groups(asked=False):
             if looks != UNIT:
-                other = f"--units {looks}" if self._one_option else ""
+                other = f"--units {shlex.quote(looks)}" if self._one_option else ""
                 said = f"if it was recorded in {looks}, say {other}" if other else "check its unit"
                 what = f"{worst.where} reaches {worst.largest:.4g} {unit}, and arms do not: {said}"
                 remarks.append(what)

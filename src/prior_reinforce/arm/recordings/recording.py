@@ -68,8 +68,8 @@ class Recording:
     positions: Positions
     """Positions in the recorder's units."""
     names: tuple[str, ...] = ()
-    """Names of the D channels as recorded, without units (`x_cm` is `x`); `joint1`, `joint2`, ...
-    if the file names none."""
+    """Names of the D channels as recorded, without units (`x_cm` is `x`); `column1`, `column2`, ...
+    if the file names none, which is what no joint is called."""
     outcome: Point | None = None
     """Where the object landed, for the rare file that holds it."""
     remarks: tuple[str, ...] = ()
@@ -85,8 +85,8 @@ class Recording:
     the joints in order."""
     beside: Mapping[str, Beside] = field(default_factory=dict)
     """What else the file holds, channel by channel: by the file's name, with its unit."""
-    named: bool = field(init=False)
-    """Whether the file names the channels."""
+    named: bool = True
+    """Whether the file names the channels; false without names."""
 
     def __post_init__(self) -> None:
         """Copy and check.
@@ -106,7 +106,7 @@ class Recording:
                 f"{episode} must hold numbers: {error}; mend or drop it"
             ) from error
         width = positions.shape[1] if positions.ndim == 2 else 0
-        names = tuple(map(str, self.names)) or tuple(f"joint{i + 1}" for i in range(width))
+        names = tuple(map(str, self.names)) or tuple(f"column{i + 1}" for i in range(width))
         names, units = without_units(names) if not self.units else (names, tuple(self.units))
         fits = positions.shape == (times.size, len(names)) and len(names) > 0
         if times.ndim != 1 or not fits or times.size < 2:
@@ -145,8 +145,9 @@ class Recording:
         times -= times[0]
         times.setflags(write=False)
         positions.setflags(write=False)
+        is_named = self.named and bool(self.names)
         checked = {
-            "times": times, "positions": positions, "named": bool(self.names), "names": names,
+            "times": times, "positions": positions, "named": is_named, "names": names,
             "units": units, "columns": tuple(self.columns) or names, "remarks": remarks,
         }  # fmt: skip
         if self.outcome is not None:
@@ -247,11 +248,15 @@ def natural_order(name: object) -> tuple[tuple[int, str], ...]:
 
 
 def files_at(source: Path, suffixes: tuple[str, ...]) -> list[Path]:
-    """Return a file itself, or a folder's files with one of the suffixes, in natural order."""
+    """Return a file itself, or a folder's files with one of the suffixes, in natural order.
+
+    Hidden files of a folder are none of its recordings: macOS leaves a `._throw.csv` beside each.
+    """
     if not source.is_dir():
         return [source]
-    found = [path for path in source.iterdir() if path.is_file() and has_suffix(path, suffixes)]
-    return sorted((path for path in found if path.stem != "outcomes"), key=natural_order)
+    seen = (path for path in source.iterdir() if path.is_file() and path.name[0] not in ".~")
+    found = [path for path in seen if has_suffix(path, suffixes) and path.stem != "outcomes"]
+    return sorted(found, key=natural_order)
 
 
 def has_suffix(path: Path, suffixes: tuple[str, ...]) -> bool:

@@ -257,12 +257,21 @@ def _topic(bag: Path, reader: Any, key: str | None, *, beside: bool) -> tuple[li
         key = next(iter(usable))
     number = beside and key in kinds and not _OF_NO_JOINT.search(kinds[str(key)])
     if key is None or not (key in usable or number):
-        listed = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(usable.items()))
+        if not usable:
+            raise FileFormatError(
+                f"{bag} has no topic of JointState or JointTrajectory, and of other messages none "
+                f"is read as the motion; it has {_listed(kinds)}: write its positions, or its "
+                "poses, as CSV, a row a message with the time and a column a number"
+            )
         raise FileFormatError(
             f"{bag}: {'no joint topic ' + key if key else f'{len(usable)} joint topics'}; topics "
-            f"of JointState or JointTrajectory are {listed or 'none'}: say which with the key"
+            f"of JointState or JointTrajectory are {_listed(usable)}: say which with the key"
         )
     return [c for c in reader.connections if c.topic == key], kinds[key]
+
+
+def _listed(kinds: Mapping[str, str]) -> str:
+    return ", ".join(f"{topic} ({kind})" for topic, kind in sorted(kinds.items())) or "none"
 
 
 def _states(

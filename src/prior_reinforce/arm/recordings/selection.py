@@ -80,6 +80,12 @@ def select(
             contradict each other.
     """
     joints = tuple(joints) if joints is not None else recordings[0].names
+    if _are_all_columns(joints, recordings, names):
+        assert names is not None
+        recordings = [replace(r, names=joints, columns=()) for r in recordings]
+        if units is not None and len(units) == len(joints):
+            units = [units[joints.index(name)] for name in names]
+        joints = tuple(names)
     unnamed = names is not None and tuple(names) == joints
     names = tuple(names) if names is not None else joints
     if not joints or len(set(joints)) != len(joints):
@@ -131,6 +137,14 @@ def select(
         other,
         listed(left_out, "; "),
     )
+
+
+def _are_all_columns(
+    joints: Sequence[str], recordings: Sequence[Recording], names: Sequence[str] | None
+) -> bool:
+    """Whether the joints name all columns of recordings without names, more than the plan's."""
+    few = names is not None and {*names} < {*joints} and len({*joints}) == len(joints)
+    return few and all(not r.named and len(r.names) == len(joints) for r in recordings)
 
 
 def _refuse_places(
@@ -193,9 +207,9 @@ def _columns(recording: Recording, joints: tuple[str, ...], names: tuple[str, ..
         )
     if len(recording.names) != len(joints):
         raise InvalidDemonstrationsError(
-            f"episode {recording.episode} has {len(recording.names)} columns without names, but "
-            f"{len(joints)} joints were given; name all its columns in order, or give some of "
-            f"{there}"
+            f"episode {recording.episode} has {len(recording.names)} columns without names, and "
+            f"the plan {len(joints)} joints; with --joints name all its columns in their order, or "
+            f"give those of {there} that are the plan's, in the plan's order"
         )
     # Columns without names are called by the joints, which may be the plan's in another order.
     return find_channels(names, joints) or list(range(len(joints)))

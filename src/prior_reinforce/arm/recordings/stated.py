@@ -121,7 +121,7 @@ def joined(
         said = place
     if len(keys) > 1 and not said:
         said = list(names_said(where, texts, widths[0], joints)) if widths[0] > 1 else [keys[0]]
-        said = said or place or [f"joint{i + 1}" for i in range(widths[0])]
+        said = said or place or [f"{keys[0]}_{i}" for i in range(widths[0])]
         for key, width in zip(keys[1:], widths[1:], strict=True):
             said += [key if width == 1 else f"{key}_{i}" for i in range(width)]
     return np.concatenate(columns, axis=1).astype(np.float64), tuple(said)

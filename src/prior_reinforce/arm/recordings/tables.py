@@ -58,6 +58,8 @@ _OF_AN_OFFICE = re.compile(
 )
 """`11/26/2026 1:05:09.3 PM`, `26.11.2026 13:05:09`: as office programs write them."""
 _SPAN = re.compile(r"([+-]?)(?:(\d+) days? \+?)?(\d+):([0-5]\d):([0-5]\d)(?:[.,](\d{1,9})\d*)?")
+_DAY = 86_400 * 10**9
+"""In [ns]."""
 _SECOND_ROW_OF_UNITS = re.compile(r"[\[(]?[A-Za-zµμ°/^*·0-9.%-]{0,12}[\])]?")
 
 
@@ -125,7 +127,9 @@ class Table:
         for read in (_moment, _span):
             found = [read(_as_iso(cell)) for cell in self.cells[column]]
             if None not in found:
-                return np.array([time - found[0] for time in found], dtype=np.int64)  # type: ignore[operator]
+                times = np.array([time - found[0] for time in found], dtype=np.int64)  # type: ignore[operator]
+                # A time of day begins anew at midnight.
+                return times + _DAY * np.cumsum(np.diff(times, prepend=0) < -_DAY // 2)
         return None
 
     def stamps(self, column: int) -> Column:
