@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 import sys
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -50,7 +49,6 @@ from prior_reinforce.errors import (
 from prior_reinforce.files import check_path, named_disk_errors
 from prior_reinforce.terminal import plain
 
-_PICTURE = "demonstrations.png"
 Unclear = tuple[Ambiguity, ...]
 """What is only guessed of units, times and names."""
 
@@ -157,14 +155,11 @@ class Import(OnWorkspace):
         if n_before:
             n = n_before + result.demonstrations.n
             print(f"appended    {n_before} demonstrations were there, now {n}")
-        picture = workspace.folder / _PICTURE
         try:
-            with named_disk_errors(workspace.folder):
-                result.preview.draw(picture)
-            print(f"picture: {picture}  (look at it before you learn)")
+            print(
+                f"picture: {result.preview.save(workspace.folder)}  (look at it before you learn)"
+            )
         except WorkspaceError as error:  # the demonstrations are taken in without it
-            with suppress(OSError):
-                picture.unlink()
             warn(f"no picture: {error}")
         if remedy := result.preview.inspection.remedy:
             print(f"next: {self._command(remedy)}")

@@ -11,7 +11,6 @@ import re
 import shutil
 import threading
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -204,13 +203,9 @@ class Imports:
                 take_guesses=body.confirmed,
                 joints=found.recordings.options.joints,
             )
-            picture = self._verbs.folder / "demonstrations.png"
             try:
-                with named_disk_errors(self._verbs.folder):
-                    result.preview.draw(picture)
+                result.preview.save(self._verbs.folder)
             except WorkspaceError as error:  # the demonstrations are taken in without it
-                with suppress(OSError):
-                    picture.unlink()
                 self._verbs.publish({"error": f"taken in, but there is no picture: {error}"})
         return self._verbs.state()
 
