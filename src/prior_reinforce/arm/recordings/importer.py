@@ -319,7 +319,7 @@ class Recordings:
         if own:
             return Outcomes.of_numbers("the recording itself", own)
         if may_lack:
-            return Outcomes.none(names or ())
+            return Outcomes.of_numbers("nothing", {})
         above = table_beside([place.parent for place in places])
         hint = f" ({above} is not beside them: name it with --outcomes if it is theirs)"
         raise InvalidDemonstrationsError(

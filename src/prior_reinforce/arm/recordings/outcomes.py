@@ -117,12 +117,6 @@ class Outcomes:
         return replace(self, where=where, values=values, names=tuple(names), units=units)
 
     @classmethod
-    def none(cls, names: Sequence[str]) -> Outcomes:
-        """No outcomes of these components."""
-        k = len(names)
-        return cls("nothing", (), np.zeros((0, k)), np.zeros(0), tuple(names), (None,) * k)
-
-    @classmethod
     def of_numbers(cls, where: str, numbers: Mapping[str, Sequence[float]]) -> Outcomes:
         """Outcomes that are numbers by episode.
 
