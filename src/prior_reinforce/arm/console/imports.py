@@ -11,6 +11,7 @@ import re
 import shutil
 import threading
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -145,7 +146,8 @@ class Imports:
                 return Dropped(0)
             try:
                 found = self._read()
-                inspection = inspect(found.selection, self._workspace.wanted())
+                apart = replace(found.selection, ambiguities=())  # which are questions
+                inspection = inspect(apart, self._workspace.wanted())
             except _OtherNamesError as error:
                 return Dropped(
                     files, problem=str(error), recorded=error.recorded, joints=error.joints
@@ -241,7 +243,7 @@ class Imports:
             raise _OtherNamesError(wanted.names or joints, first.names)
         selection = recordings.select(wanted)
         known, unclear = recordings.outcomes(wanted, may_lack=True)
-        unclear += recordings.ambiguities + selection.ambiguities
+        unclear += selection.ambiguities
         missing = missing_outcomes(selection.episodes, known)
         placed = [episode for episode in selection.episodes if episode not in missing]
         places, sds = outcomes_of(placed, known)

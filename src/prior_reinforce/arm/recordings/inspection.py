@@ -86,8 +86,6 @@ class Inspection:
     wanted: Wanted
     reports: tuple[LimitReport, ...] = ()
     """The gate's verdict on each; empty if no robot is named."""
-    ambiguities: tuple[Ambiguity, ...] = ()
-    """Units, times and names of channels that are only inferred."""
 
     def __repr__(self) -> str:
         """The text."""
@@ -107,6 +105,11 @@ class Inspection:
     def recordings(self) -> tuple[Recording, ...]:
         """The N recordings."""
         return self.selection.recordings
+
+    @property
+    def ambiguities(self) -> tuple[Ambiguity, ...]:
+        """Units, times and names of channels that are only inferred."""
+        return self.selection.ambiguities
 
     @property
     def remarks(self) -> tuple[str, ...]:
