@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -40,8 +40,7 @@ def check_scale(before: Demonstrations, selection: Selection) -> None:
     _check_alike(
         ("columns", form.names, selection.names), ("plans in", form.units, selection.units)
     )
-    for what in _out_of_scale(before, [each.positions for each in selection.recordings]):
-        raise InvalidDemonstrationsError(what)
+    _check_numbers(before, [each.positions for each in selection.recordings])
 
 
 def appended(
@@ -91,10 +90,8 @@ def _check_alike(*said: tuple[str, object, object]) -> None:
             )
 
 
-def _out_of_scale(
-    before: Demonstrations, motions: Sequence[Float[np.ndarray, "T D"]]
-) -> Iterator[str]:
-    """Channels whose numbers are so many times those in use that they are in another unit."""
+def _check_numbers(before: Demonstrations, motions: Sequence[Float[np.ndarray, "T D"]]) -> None:
+    """Refuse a channel whose numbers are so many times those in use that its unit is another."""
     for i, (name, unit) in enumerate(zip(before.format.names, before.format.units, strict=True)):
         # Where it starts and ends in the middle one of the motions.
         ours, theirs = (
@@ -112,7 +109,7 @@ def _out_of_scale(
                 starts = np.abs(larger[0]) > _FITS * largest
                 enough = _LEAST.get(unit, 0.0) * (_STARTS if starts else 1)
                 if fits and largest > enough and (starts or factor > _ANY_FACTORS[0]):
-                    yield (
+                    raise InvalidDemonstrationsError(
                         f"{name} goes from {theirs[0]:.4g} to {theirs[1]:.4g} {unit} in the new "
                         f"demonstrations, and from {ours[0]:.4g} to {ours[1]:.4g} in those so far, "
                         f"about {factor:.4g} times as much or as little: one of them is in another "
