@@ -68,13 +68,14 @@ _SAME_CLOCK = 0.01
 def moving_beside(recordings: Iterable[Recording]) -> dict[str, tuple[float, float]]:
     """Return what moves beside the motion in any of the recordings, with its range in all.
 
-    A plan lacks it.
+    A plan lacks it. Where a base stands comes last: it is many numbers, and long lists are cut.
     """
     ends: dict[str, list[float]] = {}
     for recording in recordings:
-        for low, high, called in recording.beside.values():
-            ends.setdefault(called, []).extend((low, high))
-    return {called: (min(own), max(own)) for called, own in ends.items() if called}
+        for low, high, name in recording.beside.values():
+            ends.setdefault(name, []).extend((low, high))
+    called = sorted(filter(None, ends), key=is_of_base)
+    return {name: (min(ends[name]), max(ends[name])) for name in called}
 
 
 def columns_beside(
