@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 import sys
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -21,6 +20,7 @@ from prior_reinforce.arm.recordings import (
 )
 from prior_reinforce.arm.recordings.outcomes import (
     OUTCOMES_FILE,
+    Outcomes,
     missing_outcomes,
     table_beside,
     write_outcome_table,
@@ -50,7 +50,6 @@ from prior_reinforce.errors import (
 from prior_reinforce.files import check_path, named_disk_errors
 from prior_reinforce.terminal import plain
 
-_PICTURE = "demonstrations.png"
 Unclear = tuple[Ambiguity, ...]
 """What is only guessed of units, times and names."""
 
@@ -109,37 +108,31 @@ class Import(OnWorkspace):
                 options = replace(self.options, joints=self.options.joints or wanted.names)
                 recordings = read(source, options)
                 selection = recordings.select(wanted)
-                unclear = recordings.ambiguities + selection.ambiguities
             except InvalidDemonstrationsError as error:
                 if not self.inspect or self.options.joints is not None or not wanted.names:
                     raise
                 recordings = read(source, self.options)  # what is there, by its own names
                 selection = recordings.select(replace(wanted, names=None, plan_units=None))
-                unclear = (*recordings.ambiguities, Ambiguity(str(error), "--joints COLUMN ..."))
+                doubt = Ambiguity(str(error), "--joints COLUMN ...")
+                selection = replace(selection, ambiguities=(*recordings.ambiguities, doubt))
             if self.options.joints is not None:  # said, though they are the plan's own
-                unclear = tuple(one for one in unclear if not one.option.startswith("--joints"))
+                others = [a for a in selection.ambiguities if not a.option.startswith("--joints")]
+                selection = replace(selection, ambiguities=tuple(others))
             if self.inspect:
-                self._inspect(wanted, recordings, selection, unclear)
+                self._inspect(wanted, recordings, selection)
             else:
-                self._import(workspace, wanted, recordings, selection, unclear)
+                self._import(workspace, wanted, recordings, selection)
         except UnclearUnitsError as error:
             also = f"{error.also}; and " if error.also else ""
             command = self._command(error.options)
             raise ConfigurationError(f"{also}{error.what}; if so: {command}") from error
 
     def _import(
-        self,
-        workspace: Workspace,
-        wanted: Wanted,
-        recordings: Recordings,
-        selection: Selection,
-        unclear: Unclear,
+        self, workspace: Workspace, wanted: Wanted, recordings: Recordings, selection: Selection
     ) -> None:
         form, at_terminal = workspace.manifest.outcome_format, sys.stdin.isatty()
-        known, more = recordings.outcomes(
-            wanted, self.outcomes, self.outcome_unit, unclear=unclear, may_lack=at_terminal
-        )
-        _settle(unclear + more, at_terminal=at_terminal)
+        known, unclear = self._known(wanted, recordings, selection, may_lack=at_terminal)
+        _settle(unclear, at_terminal=at_terminal)
         if at_terminal:
             source = recordings.source
             answers = ask_for_outcomes(workspace.folder, source, known, selection, form)
@@ -157,29 +150,30 @@ class Import(OnWorkspace):
         if n_before:
             n = n_before + result.demonstrations.n
             print(f"appended    {n_before} demonstrations were there, now {n}")
-        picture = workspace.folder / _PICTURE
         try:
-            with named_disk_errors(workspace.folder):
-                result.preview.draw(picture)
-            print(f"picture: {picture}  (look at it before you learn)")
+            print(
+                f"picture: {result.preview.save(workspace.folder)}  (look at it before you learn)"
+            )
         except WorkspaceError as error:  # the demonstrations are taken in without it
-            with suppress(OSError):
-                picture.unlink()
             warn(f"no picture: {error}")
         if remedy := result.preview.inspection.remedy:
             print(f"next: {self._command(remedy)}")
         else:
             print_next(workspace)
 
-    def _inspect(
-        self, wanted: Wanted, recordings: Recordings, selection: Selection, unclear: Unclear
-    ) -> None:
-        found = replace(inspect(selection, wanted), ambiguities=unclear)
+    def _known(
+        self, wanted: Wanted, recordings: Recordings, selection: Selection, *, may_lack: bool
+    ) -> tuple[Outcomes, Unclear]:
+        """The outcomes, and all that is only guessed."""
+        said, unclear = (self.outcomes, self.outcome_unit), selection.ambiguities
+        found, more = recordings.outcomes(wanted, *said, unclear=unclear, may_lack=may_lack)
+        return found, unclear + more
+
+    def _inspect(self, wanted: Wanted, recordings: Recordings, selection: Selection) -> None:
+        found = inspect(selection, wanted)
         places, episodes = recordings.outcome_places, selection.episodes
         table = self.outcomes or table_beside(places)
-        known, more = recordings.outcomes(
-            wanted, self.outcomes, self.outcome_unit, unclear=unclear, may_lack=True
-        )
+        known, unclear = self._known(wanted, recordings, selection, may_lack=True)
         missing: list[str] = []
         if table is not None:
             missing = missing_outcomes(episodes, known)
@@ -193,7 +187,7 @@ class Import(OnWorkspace):
             with named_disk_errors(places[0]):
                 write_outcome_table(table, rows, names, units)
             said = f"none yet; fill in {table} (units are in its first line)"
-        options = " ".join(dict.fromkeys(one.option for one in unclear + more))
+        options = " ".join(dict.fromkeys(one.option for one in unclear))
         command = self._command(options, found.remedy)
         if self.json:
             record = InspectView(
@@ -202,7 +196,7 @@ class Import(OnWorkspace):
                 episodes=[*episodes],
                 findings=found.rows,
                 remarks=[*found.remarks],
-                unclear=[one.what for one in unclear + more],
+                unclear=[one.what for one in unclear],
                 outcomes=None if table is None else str(table),
                 outcomes_missing=missing,
                 next=command,

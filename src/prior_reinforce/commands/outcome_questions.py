@@ -6,8 +6,7 @@ again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -17,12 +16,11 @@ import numpy as np
 from prior_reinforce.arm.recordings.outcome_units import in_units
 from prior_reinforce.arm.recordings.outcomes import (
     OUTCOMES_FILE,
-    SD,
-    SOURCE,
     Outcomes,
-    outcomes_of,
+    Place,
+    keep_places,
+    places_of,
     read_outcomes,
-    write_outcome_table,
 )
 from prior_reinforce.arm.recordings.selection import Selection
 from prior_reinforce.commands.questions import answer_to
@@ -31,15 +29,12 @@ from prior_reinforce.errors import (
     InvalidFeedbackError,
     PriorReinforceError,
 )
-from prior_reinforce.files import named_disk_errors
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.parsing import read_uncertain_place
 from prior_reinforce.terminal import plain
 from prior_reinforce.wording import in_words, say_length, say_place
 
 _SKIP, _BACK = ("skip", "s"), ("back", "b")
-Place = tuple[float, ...]
-"""The components of an outcome, and their standard deviation."""
 
 
 def ask_for_outcomes(
@@ -61,11 +56,7 @@ def ask_for_outcomes(
         InvalidDemonstrationsError: The input ended; the answers so far are kept.
         WorkspaceError: The disk is full, or the folder read-only.
     """
-    outcomes: dict[str, Place] = {}
-    for episode in selection.episodes:
-        with suppress(InvalidDemonstrationsError):
-            place, sd = outcomes_of([episode], known)
-            outcomes[episode] = (*place[0].tolist(), float(sd[0, 0]))
+    outcomes = places_of(selection.episodes, known)
     missing = [episode for episode in selection.episodes if episode not in outcomes]
     if not missing:
         return None
@@ -120,17 +111,6 @@ def ask_place(ask: Callable[[], str], form: OutcomeFormat, *words: str) -> Place
             print(error, flush=True)
         else:
             return (*place.tolist(), sd)
-
-
-def keep_places(
-    table: Path, places: Mapping[str, Place], form: OutcomeFormat, source: Path | None = None
-) -> None:
-    """Write a table of places by episode, as `import` reads it, and the source of the episodes."""
-    units, beside = form.units, () if source is None else (source.resolve(),)
-    rows = {episode: (*map(repr, place), *beside) for episode, place in places.items()}
-    heads = (*form.names, SD), (*units, units[0])
-    with named_disk_errors(table.parent):
-        write_outcome_table(table, rows, *heads, beside=SOURCE if beside else "note")
 
 
 def _typed_before(folder: Path, source: Path, form: OutcomeFormat) -> tuple[Path, dict[str, Place]]:

@@ -19,12 +19,12 @@ from prior_reinforce.arm.executing.drive import arms_columns, guiding_of
 from prior_reinforce.arm.executing.lock import executing_lock
 from prior_reinforce.arm.executing.watch import State, Take, Watch
 from prior_reinforce.arm.recordings.options import ReadOptions
-from prior_reinforce.arm.recordings.outcomes import OUTCOMES_FILE
+from prior_reinforce.arm.recordings.outcomes import OUTCOMES_FILE, Place, keep_places
 from prior_reinforce.arm.workspace.manifest import Manifest
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.commands.base import OnWorkspace
 from prior_reinforce.commands.importing import Import
-from prior_reinforce.commands.outcome_questions import Place, ask_place, keep_places
+from prior_reinforce.commands.outcome_questions import ask_place
 from prior_reinforce.commands.questions import agrees
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.files import named_disk_errors

@@ -8,8 +8,11 @@ from prior_reinforce.arm.recordings.beside import (
     arrays_beside,
     columns_beside,
     is_clock,
+    moving_beside,
     twin_vectors,
 )
+from prior_reinforce.arm.recordings.recording import Recording
+from prior_reinforce.arm.recordings.selection import select
 from prior_reinforce.errors import UnclearUnitsError
 from tests.arm.recordings.recorded import UR, Q, S, T, sampled
 
@@ -166,3 +169,10 @@ def test_a_base_that_moves_is_named_though_it_is_called_a_pose():
     found = arrays_beside(Q, others, T)
     assert moving(found) == named
     assert found["base_pose[0]"][:2] == (0.0, pytest.approx(0.3))
+
+
+def test_a_base_of_many_numbers_hides_no_gripper():
+    others = {"base_T": np.tile(np.eye(4), (len(S), 1, 1)) + S[:, None, None], "grip": S}
+    recording = Recording("a", T, Q, UR, beside=arrays_beside(Q, others, T))
+    assert [*moving_beside([recording])][:2] == ["grip", "base_T[0]"]
+    assert select([recording]).left_out.startswith("grip, 0 to 1; base_T[0], 1 to 2; base_T[1], 0")

@@ -7,7 +7,9 @@ from prior_reinforce.arm.recordings import import_demonstrations
 from prior_reinforce.arm.recordings.outcomes import (
     check_rows,
     digits_at_end,
+    keep_places,
     missing_outcomes,
+    places_of,
     read_outcomes,
     write_outcome_table,
 )
@@ -16,6 +18,7 @@ from prior_reinforce.errors import (
     FileFormatError,
     InvalidDemonstrationsError,
 )
+from prior_reinforce.formats import OutcomeFormat
 from tests.arm.recordings.recorded import (
     OUTCOMES,
     rows_of_outcomes,
@@ -368,3 +371,19 @@ def test_other_columns_may_hold_anything(recording, tmp_path, head):
     path = table(tmp_path, "\n".join([f"episode,{head},surface", *rows]))
     result = import_demonstrations(recording, outcomes=path, outcome_names=("x", "y"))
     np.testing.assert_allclose(result.demonstrations.outcomes_seen, list(OUTCOMES.values()))
+
+
+def test_places_that_are_kept_are_read_again(tmp_path):
+    places = {"throw_1": (0.1, -0.2, 0.005), "throw_2": (1 / 3, 0.0, 0.0)}
+    keep_places(tmp_path / "t.csv", places, OutcomeFormat.metres(2), tmp_path)
+    read = read_outcomes(tmp_path / "t.csv")
+    assert places_of(["throw_2", "take", "1"], read) == {
+        "throw_2": places["throw_2"],
+        "1": places["throw_1"],
+    }
+    assert read.sources == (str(tmp_path.resolve()),) * 2
+
+
+def test_two_episodes_of_one_number_have_no_place_by_it(tmp_path):
+    keep_places(tmp_path / "t.csv", {"1": (0.1, 0.2, 0.0)}, OutcomeFormat.metres(2))
+    assert places_of(["a_1", "b_1"], read_outcomes(tmp_path / "t.csv")) == {}

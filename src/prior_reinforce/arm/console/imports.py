@@ -11,11 +11,10 @@ import re
 import shutil
 import threading
 from collections.abc import Sequence
-from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
 from msgspec import Struct
 
 from prior_reinforce.arm.console.verbs import Seen, Verbs
@@ -24,10 +23,8 @@ from prior_reinforce.arm.recordings import ReadOptions, Recordings, inspect, rea
 from prior_reinforce.arm.recordings.naming import find_channels, numbered_like
 from prior_reinforce.arm.recordings.outcomes import (
     OUTCOMES_FILE,
-    SD,
-    missing_outcomes,
-    outcomes_of,
-    write_outcome_table,
+    keep_places,
+    places_of,
 )
 from prior_reinforce.arm.recordings.selection import Selection
 from prior_reinforce.arm.recordings.units import Ambiguity, say_names
@@ -95,7 +92,7 @@ class _Found(NamedTuple):
 
     recordings: Recordings
     selection: Selection
-    rows: dict[str, list[float]]
+    rows: dict[str, tuple[float, ...]]
     """Outcome and its standard deviation by episode, where they are known."""
     unclear: tuple[Ambiguity, ...]
     """What is only guessed of their units."""
@@ -146,36 +143,34 @@ class Imports:
                 return Dropped(0)
             try:
                 found = self._read()
-                inspection = inspect(found.selection, self._workspace.wanted())
+                apart = replace(found.selection, ambiguities=())  # which are questions
+                inspection = inspect(apart, self._workspace.wanted())
             except _OtherNamesError as error:
                 return Dropped(
                     files, problem=str(error), recorded=error.recorded, joints=error.joints
                 )
             except PriorReinforceError as error:
                 return Dropped(files, problem=str(error))
-        places = {name: row[:-1] for name, row in found.rows.items()}
+        places = {name: [*row[:-1]] for name, row in found.rows.items()}
         episodes = {name: places.get(name) for name in found.selection.episodes}
         questions = [one.what for one in found.unclear]
         return Dropped(files, inspection.text, questions=questions, episodes=episodes)
 
     def place(self, body: Place) -> Dropped:
         """Write down where a recording's object landed."""
-        manifest = self._workspace.manifest
-        names, units = manifest.outcome_format.names, manifest.outcome_format.units
+        form = self._workspace.manifest.outcome_format
         with self._lock:
             found = self._read()
             if body.episode not in found.selection.episodes:
                 raise InvalidDemonstrationsError(f"there is no recording {body.episode[:80]!r}")
-            if body.outcome is not None and len(body.outcome) != len(names):
-                raise InvalidFeedbackError(f"an outcome is numbers: {', '.join(names)}")
+            if body.outcome is not None and len(body.outcome) != form.outcome_dim:
+                raise InvalidFeedbackError(f"an outcome is numbers: {', '.join(form.names)}")
             rows = found.rows
             rows.pop(body.episode, None)
             if body.outcome is not None:
-                rows[body.episode] = [*body.outcome, body.sd]
-            cells = {episode: tuple(map(repr, row)) for episode, row in rows.items()}
+                rows[body.episode] = (*body.outcome, body.sd)
             table = found.recordings.outcome_places[0] / OUTCOMES_FILE
-            with named_disk_errors(self._folder):
-                write_outcome_table(table, cells, (*names, SD), (*units, units[0]))
+            keep_places(table, rows, form)
             self._verbs.publish({"recordings": len(rows)})
             return self.look()
 
@@ -204,13 +199,9 @@ class Imports:
                 take_guesses=body.confirmed,
                 joints=found.recordings.options.joints,
             )
-            picture = self._verbs.folder / "demonstrations.png"
             try:
-                with named_disk_errors(self._verbs.folder):
-                    result.preview.draw(picture)
+                result.preview.save(self._verbs.folder)
             except WorkspaceError as error:  # the demonstrations are taken in without it
-                with suppress(OSError):
-                    picture.unlink()
                 self._verbs.publish({"error": f"taken in, but there is no picture: {error}"})
         return self._verbs.state()
 
@@ -246,11 +237,8 @@ class Imports:
             raise _OtherNamesError(wanted.names or joints, first.names)
         selection = recordings.select(wanted)
         known, unclear = recordings.outcomes(wanted, may_lack=True)
-        unclear += recordings.ambiguities + selection.ambiguities
-        missing = missing_outcomes(selection.episodes, known)
-        placed = [episode for episode in selection.episodes if episode not in missing]
-        places, sds = outcomes_of(placed, known)
-        rows = dict(zip(placed, np.column_stack([places, sds[:, :1]]).tolist(), strict=True))
+        unclear += selection.ambiguities
+        rows = places_of(selection.episodes, known)
         return _Found(recordings, selection, rows, unclear)
 
 

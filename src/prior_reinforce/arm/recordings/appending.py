@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -37,17 +37,10 @@ def check_scale(before: Demonstrations, selection: Selection) -> None:
             use that they are in another unit.
     """
     form = before.format
-    for what, one, other in (
-        ("columns", form.names, selection.names),
-        ("plans in", form.units, selection.units),
-    ):
-        if one != other:
-            raise InvalidDemonstrationsError(
-                f"the demonstrations so far have {what} {one}, the new ones {other}; import all "
-                "together"
-            )
-    for what in _out_of_scale(before, [each.positions for each in selection.recordings]):
-        raise InvalidDemonstrationsError(what)
+    _check_alike(
+        ("columns", form.names, selection.names), ("plans in", form.units, selection.units)
+    )
+    _check_numbers(before, [each.positions for each in selection.recordings])
 
 
 def appended(
@@ -60,16 +53,12 @@ def appended(
     Raises:
         InvalidDemonstrationsError: They mean other numbers, or have a motion twice.
     """
-    for what, one, other in (
+    ours, theirs = before.outcome_format, more.outcome_format
+    _check_alike(
         ("plans of", before.format, more.format),
-        ("outcomes", before.outcome_format.names, more.outcome_format.names),
-        ("outcomes in", before.outcome_format.units, more.outcome_format.units),
-    ):
-        if one != other:
-            raise InvalidDemonstrationsError(
-                f"the demonstrations so far have {what} {one}, the new ones {other}; import all "
-                "together"
-            )
+        ("outcomes", ours.names, theirs.names),
+        ("outcomes in", ours.units, theirs.units),
+    )
     horizon = max(before.horizon, more.horizon)
     plans = np.concatenate(
         [
@@ -77,8 +66,7 @@ def appended(
             for p in (before.plans, more.plans)
         ]
     )
-    called = [*(f"demonstration {i} so far" for i in range(before.n)), *episodes]
-    if twice := copies(plans, called):
+    if twice := copies(plans, [*so_far(before.n), *episodes]):
         raise InvalidDemonstrationsError(twice)
     both: dict[str, Any] = {
         name: np.concatenate([getattr(before, name), getattr(more, name)])
@@ -87,15 +75,23 @@ def appended(
     return replace(more, plans=plans, **both)
 
 
-def _stands(ours: np.ndarray, theirs: np.ndarray, largest: float) -> bool:
-    """Whether a channel stands still, somewhere in each: it says nothing of its unit."""
-    return bool(max(np.ptp(ours), np.ptp(theirs)) < _STANDS * largest)
+def so_far(n: int) -> list[str]:
+    """Return what to call the demonstrations in use."""
+    return [f"demonstration {i} so far" for i in range(n)]
 
 
-def _out_of_scale(
-    before: Demonstrations, motions: Sequence[Float[np.ndarray, "T D"]]
-) -> Iterator[str]:
-    """Channels whose numbers are so many times those in use that they are in another unit."""
+def _check_alike(*said: tuple[str, object, object]) -> None:
+    """Refuse new demonstrations of which something is another than of those in use."""
+    for what, ours, theirs in said:
+        if ours != theirs:
+            raise InvalidDemonstrationsError(
+                f"the demonstrations so far have {what} {ours}, the new ones {theirs}; import all "
+                "together"
+            )
+
+
+def _check_numbers(before: Demonstrations, motions: Sequence[Float[np.ndarray, "T D"]]) -> None:
+    """Refuse a channel whose numbers are so many times those in use that its unit is another."""
     for i, (name, unit) in enumerate(zip(before.format.names, before.format.units, strict=True)):
         # Where it starts and ends in the middle one of the motions.
         ours, theirs = (
@@ -103,7 +99,8 @@ def _out_of_scale(
             for each in (before.plans, motions)
         )
         largest, least = np.abs([ours, theirs]).max(), np.abs([ours, theirs]).max(axis=1).min()
-        if unit == "1" or least == 0 or _stands(ours, theirs, largest):
+        stands = max(np.ptp(ours), np.ptp(theirs)) < _STANDS * largest  # somewhere in each
+        if unit == "1" or least == 0 or stands:
             continue
         for factor in _FACTORS.get(unit, _ANY_FACTORS):
             for larger, smaller in ((theirs, ours), (ours, theirs)):
@@ -112,7 +109,7 @@ def _out_of_scale(
                 starts = np.abs(larger[0]) > _FITS * largest
                 enough = _LEAST.get(unit, 0.0) * (_STARTS if starts else 1)
                 if fits and largest > enough and (starts or factor > _ANY_FACTORS[0]):
-                    yield (
+                    raise InvalidDemonstrationsError(
                         f"{name} goes from {theirs[0]:.4g} to {theirs[1]:.4g} {unit} in the new "
                         f"demonstrations, and from {ours[0]:.4g} to {ours[1]:.4g} in those so far, "
                         f"about {factor:.4g} times as much or as little: one of them is in another "

@@ -68,13 +68,14 @@ _SAME_CLOCK = 0.01
 def moving_beside(recordings: Iterable[Recording]) -> dict[str, tuple[float, float]]:
     """Return what moves beside the motion in any of the recordings, with its range in all.
 
-    A plan lacks it.
+    A plan lacks it. Where a base stands comes last: it is many numbers, and long lists are cut.
     """
     ends: dict[str, list[float]] = {}
     for recording in recordings:
-        for low, high, called in recording.beside.values():
-            ends.setdefault(called, []).extend((low, high))
-    return {called: (min(own), max(own)) for called, own in ends.items() if called}
+        for low, high, name in recording.beside.values():
+            ends.setdefault(name, []).extend((low, high))
+    called = sorted(filter(None, ends), key=is_of_base)
+    return {name: (min(ends[name]), max(ends[name])) for name in called}
 
 
 def columns_beside(
@@ -115,37 +116,21 @@ def arrays_beside(
         numbers = values.reshape(len(values), -1).astype(np.float64)
         own = (columns or {}).get(name) or [f"{name}[{i}]" for i in range(width)]
         own = own if width > 1 else [name]
-        moving = np.array([may and _moves(column) for column in numbers.T])
-        if not _may_be_of_arm(name, numbers, moving, motion, times, called, others):
-            moving[:] = False
-        rate = f" ({len(values)} frames, beside {len(motion)})" * (len(values) != len(motion))
-        for channel, column, moves in zip(own, numbers.T, moving.tolist(), strict=True):
+        moving = [i for i, column in enumerate(numbers.T) if may and _moves(column)]
+        at, rate, along = times, "", numbers
+        if moving and len(values) != len(motion):
+            at = np.linspace(times[0], times[-1], len(values))
+            rate = f" ({len(values)} frames, beside {len(motion)})"
+            along = np.column_stack([np.interp(times, at, column) for column in numbers.T])
+            moving = moving if _is_series(name, numbers[:, moving], others) else []
+        clocks = all(is_clock(name, numbers[:, i], at) for i in moving)
+        if clocks or (not _of_another(name, called) and _follows(along, motion)):
+            moving = []
+        for i, (channel, column) in enumerate(zip(own, numbers.T, strict=True)):
             if np.any(np.isfinite(column)):
-                said = f"{channel if of_base else name}{rate}" if moves else ""
+                said = f"{channel if of_base else name}{rate}" if i in moving else ""
                 found[channel] = Beside(float(np.nanmin(column)), float(np.nanmax(column)), said)
     return found
-
-
-def _may_be_of_arm(
-    name: str,
-    columns: np.ndarray,
-    moving: np.ndarray,
-    motion: Positions,
-    times: Times,
-    called: Sequence[str],
-    others: Arrays,
-) -> bool:
-    """Whether an array moves, and is no clock and no other reading of the motion: its command."""
-    at = times
-    if len(columns) != len(motion):
-        if not _is_series(name, columns[:, moving], others):
-            return False
-        at = np.linspace(times[0], times[-1], len(columns))
-    if all(is_clock(name, column, at) for column in columns[:, moving].T):
-        return False
-    if at is not times:
-        columns = np.column_stack([np.interp(times, at, column) for column in columns.T])
-    return _of_another(name, called) or not _follows(columns, motion)
 
 
 def twin_vectors(names: Sequence[str], values: Positions) -> Iterator[Ambiguity]:

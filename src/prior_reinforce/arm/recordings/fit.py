@@ -31,8 +31,15 @@ _ORDER_BETTER, _SIGNS_BETTER, _FEWEST_BETTER = 2.5, 6.0, 6.0
 _CERTAIN, _FAR = 0.0, 4.0
 """A number so many times as far out as the others reach widens the spread in which errors are
 counted: there errors in the outcomes' unit are to be `_FAR_BETTER` times smaller. Ours."""
-_FACTORS = (0.1, 10.0, 0.01, 100.0)
-"""By which a wrong decimal point, or centimetres for metres, is put right."""
+_CHANGES = (
+    (-1.0, "have lost its sign", _SIGN_BETTER),
+    (0.1, "be 10 times too large", _POINT_BETTER),
+    (10.0, "be 10 times too small", _POINT_BETTER),
+    (0.01, "be 100 times too large", _POINT_BETTER),
+    (100.0, "be 100 times too small", _POINT_BETTER),
+)
+"""Factors by which a number is put right, what is wrong with it, and by how much better it must be:
+a sign, a decimal point, or centimetres for metres."""
 _TURNS = 24
 """Lines through the plane of two directions of plans that are tried to tell signs."""
 _BEYOND = 1.3
@@ -164,16 +171,7 @@ def _candidates(
         for c, name in enumerate(names):
             if not outcomes[i, c]:
                 continue  # zero has neither sign nor decimal point
-            points = (
-                (
-                    f,
-                    f"be {max(f, 1 / f):g} times too {'small' if f > 1 else 'large'}",
-                    _POINT_BETTER,
-                )
-                for f in _FACTORS
-            )
-            changes = ((-1.0, "have lost its sign", _SIGN_BETTER), *points)
-            for factor, says, least in changes:
+            for factor, says, least in _CHANGES:
                 other = outcomes.copy()
                 other[i, c] *= factor
                 rest = np.delete(outcomes[:, c], i)

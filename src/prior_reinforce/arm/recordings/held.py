@@ -29,16 +29,10 @@ def check_held(recordings: Sequence[Recording], robot: RobotLimits | None) -> No
     for joint, at in robot.held.items() if robot is not None else ():
         elsewhere: dict[tuple[float, float], list[str]] = {}
         for recording in recordings:
-            for column in [one for one in recording.beside if find_channels([joint], [one])]:
-                span, unit = recording.beside[column][:2], split_unit(column, CHANNEL_UNITS)[1]
-                units = (
-                    ["m", "rad"] if max(map(abs, span)) <= UNITS["rad"].largest else CHANNEL_UNITS
-                )
-                units = [unit] if unit else units
-                scales = [scale for u in units for b in ("m", "rad") if (scale := factor(u, b))]
-                if not any(all(abs(s * end - at) <= _OFF for end in span) for s in scales or [1.0]):
-                    low, high = (float(f"{end:.3g}") for end in span)
-                    elsewhere.setdefault((low, high), []).append(recording.episode)
+            for column, (low, high, _) in recording.beside.items():
+                if find_channels([joint], [column]) and not _stands_at(at, column, low, high):
+                    span = float(f"{low:.3g}"), float(f"{high:.3g}")
+                    elsewhere.setdefault(span, []).append(recording.episode)
         if elsewhere:
             each = [
                 (f"at {low:.4g}" if high - low <= _OFF else f"from {low:.4g} to {high:.4g}")
@@ -50,3 +44,12 @@ def check_held(recordings: Sequence[Recording], robot: RobotLimits | None) -> No
                 f"make the workspace with --hold {joint}=WHERE IT STOOD, or leave out the "
                 "recordings in which it stood elsewhere (--leave-out)"
             )
+
+
+def _stands_at(at: float, column: str, low: float, high: float) -> bool:
+    """Whether a column stays at a place, in the unit that it states, or in one that it may have."""
+    unit = split_unit(column, CHANNEL_UNITS)[1]
+    usual = max(abs(low), abs(high)) <= UNITS["rad"].largest
+    units = [unit] if unit else ["m", "rad"] if usual else CHANNEL_UNITS
+    scales = [scale for u in units for base in ("m", "rad") if (scale := factor(u, base))]
+    return any(all(abs(s * end - at) <= _OFF for end in (low, high)) for s in scales or [1.0])

@@ -154,10 +154,9 @@ def import_demonstrations(
     )
     recordings = read(source, ReadOptions(**options))
     selection = recordings.select(wanted)
-    unclear = recordings.ambiguities + selection.ambiguities
-    asked = () if take_guesses else unclear
+    asked = () if take_guesses else selection.ambiguities
     known, more = recordings.outcomes(wanted, outcomes, outcome_unit, unclear=asked)
-    raise_if_ambiguous(unclear + more, take_guesses=take_guesses)
+    raise_if_ambiguous(selection.ambiguities + more, take_guesses=take_guesses)
     return recordings.demonstrations(selection, known, wanted)
 
 
@@ -179,9 +178,7 @@ def inspect_recordings(
     called = None if names is None else tuple(names)
     wanted = Wanted(called, plan_units, preprocessing=preprocessing, robot=robot, gate=gate)
     recordings = read(source, ReadOptions(**options))
-    selection = recordings.select(wanted)
-    found = inspect(selection, wanted)
-    return replace(found, ambiguities=recordings.ambiguities + selection.ambiguities)
+    return inspect(recordings.select(wanted), wanted)
 
 
 def read_recordings(
@@ -248,8 +245,8 @@ class Recordings:
         return [self.source.parent, self.source] if alone else [self.source]
 
     def select(self, wanted: Wanted) -> Selection:
-        """Return the channels of the plan, as in `selection.select`."""
-        return select(
+        """Return the channels of the plan, as in `selection.select`, and what is only guessed."""
+        selection = select(
             self.episodes,
             self.options.joints,
             wanted.names,
@@ -257,6 +254,7 @@ class Recordings:
             wanted.plan_units,
             normalised=self.format == "lerobot",
         )
+        return replace(selection, ambiguities=self.ambiguities + selection.ambiguities)
 
     def outcomes(
         self,
@@ -319,7 +317,7 @@ class Recordings:
         if own:
             return Outcomes.of_numbers("the recording itself", own)
         if may_lack:
-            return Outcomes.none(names or ())
+            return Outcomes.of_numbers("nothing", {})
         above = table_beside([place.parent for place in places])
         hint = f" ({above} is not beside them: name it with --outcomes if it is theirs)"
         raise InvalidDemonstrationsError(

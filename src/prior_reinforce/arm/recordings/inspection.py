@@ -24,7 +24,7 @@ from prior_reinforce.arm.recordings.turns import aligned
 from prior_reinforce.arm.recordings.units import Ambiguity, say_names
 from prior_reinforce.arm.robots import GateSettings, RobotLimits, check_plan
 from prior_reinforce.arm.robots.limits import match_joints
-from prior_reinforce.arm.robots.report import LimitReport
+from prior_reinforce.arm.robots.report import LimitLine, LimitReport
 from prior_reinforce.errors import ConfigurationError, InvalidPlanError
 from prior_reinforce.plans.interpolation import RATE
 from prior_reinforce.plans.motions import Demonstrations, Plan
@@ -86,8 +86,6 @@ class Inspection:
     wanted: Wanted
     reports: tuple[LimitReport, ...] = ()
     """The gate's verdict on each; empty if no robot is named."""
-    ambiguities: tuple[Ambiguity, ...] = ()
-    """Units, times and names of channels that are only inferred."""
 
     def __repr__(self) -> str:
         """The text."""
@@ -109,6 +107,11 @@ class Inspection:
         return self.selection.recordings
 
     @property
+    def ambiguities(self) -> tuple[Ambiguity, ...]:
+        """Units, times and names of channels that are only inferred."""
+        return self.selection.ambiguities
+
+    @property
     def remarks(self) -> tuple[str, ...]:
         """Warnings, the most important first: limits, ends, gaps, ..."""
         left_out = self.selection.left_out
@@ -123,12 +126,16 @@ class Inspection:
         return tuple(filter(None, (*first, last, *self.processed.remarks)))
 
     @property
+    def _refusals(self) -> list[list[LimitLine]]:
+        """What the gate refuses of each demonstration."""
+        return [[one for one in r.lines if one.status == "refuse"] for r in self.reports]
+
+    @property
     def remedy(self) -> str:
         """An option that may help if no demonstration passes the gate; else empty."""
         if not self.reports or not all(report.refused for report in self.reports):
             return ""
-        broken = {line.check for r in self.reports for line in r.lines if line.status == "refuse"}
-        if "position" in broken:
+        if any(line.check == "position" for lines in self._refusals for line in lines):
             return self.selection.other_unit
         return _SMOOTH if self._smoothing_helps else ""
 
@@ -215,10 +222,9 @@ class Inspection:
     def _broken(self) -> list[str]:
         """Limits that demonstrations break; plans like them will be refused."""
         said: dict[str, list[str]] = {}
-        for recording, report in zip(self.recordings, self.reports, strict=False):
-            for line in report.lines:
-                if line.status == "refuse":
-                    said.setdefault(line.check, []).append(f"{recording.episode} ({line.text})")
+        for recording, lines in zip(self.recordings, self._refusals, strict=False):
+            for line in lines:
+                said.setdefault(line.check, []).append(f"{recording.episode} ({line.text})")
         found = [
             f"the gate refuses {check}: {', '.join(episodes)}" for check, episodes in said.items()
         ]
@@ -283,7 +289,7 @@ class Inspection:
     @cached_property
     def _smoothing_helps(self) -> bool:
         """Whether more demonstrations pass once smoothed; tried, as motion breaks limits too."""
-        broken = [{line.check for line in r.lines if line.status == "refuse"} for r in self.reports]
+        broken = [{line.check for line in lines} for lines in self._refusals]
         out_of_range = all("position" in each for each in broken if each)
         if self.processed.smoothed is not None or out_of_range:
             return False

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.arm.recordings.channels import Kind, kinds
+from prior_reinforce.arm.recordings.clock import Times
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.signals import noise
@@ -38,7 +39,6 @@ _NEAR = 0.05
 """Share of these that a counter may miss just before it starts again. Ours: it is fast, or slow to
 be read."""
 
-Times = Float[np.ndarray, " T"]
 Values = Float[np.ndarray, " T"]
 """One channel at these times."""
 

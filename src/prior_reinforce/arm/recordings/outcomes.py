@@ -30,7 +30,7 @@ from prior_reinforce.arm.recordings.units import (
 )
 from prior_reinforce.arrays import Points
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError
-from prior_reinforce.files import as_cell, from_cell, write
+from prior_reinforce.files import as_cell, from_cell, named_disk_errors, write
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.units import base_of
 from prior_reinforce.wording import PLACE_WORDS, axes_of
@@ -54,6 +54,10 @@ _RADII = ("r", "radius", "distance", "dist", "range")
 _BEARINGS = ("angle", "bearing", "azimuth", "theta", "phi", "heading", "direction")
 SOURCE = "source"
 _NOT_COMPONENTS = (SD, SOURCE, "note", "notes", "comment", "comments")
+
+
+Place = tuple[float, ...]
+"""The components of an outcome, and their standard deviation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,12 +121,6 @@ class Outcomes:
         return replace(self, where=where, values=values, names=tuple(names), units=units)
 
     @classmethod
-    def none(cls, names: Sequence[str]) -> Outcomes:
-        """No outcomes of these components."""
-        k = len(names)
-        return cls("nothing", (), np.zeros((0, k)), np.zeros(0), tuple(names), (None,) * k)
-
-    @classmethod
     def of_numbers(cls, where: str, numbers: Mapping[str, Sequence[float]]) -> Outcomes:
         """Outcomes that are numbers by episode.
 
@@ -177,6 +175,21 @@ def write_outcome_table(
         filled = [*cells, *[""] * (len(names) + 1 - len(cells))]
         writer.writerow([as_cell(episode), *filled])
     write(path, text.getvalue())
+
+
+def keep_places(
+    table: Path, places: Mapping[str, Place], form: OutcomeFormat, source: Path | None = None
+) -> None:
+    """Write a table of places by episode, as `import` reads it, and the source of the episodes.
+
+    Raises:
+        WorkspaceError: The disk is full, or the folder read-only.
+    """
+    units, beside = form.units, () if source is None else (source.resolve(),)
+    rows = {episode: (*map(repr, place), *beside) for episode, place in places.items()}
+    heads = (*form.names, SD), (*units, units[0])
+    with named_disk_errors(table.parent):
+        write_outcome_table(table, rows, *heads, beside=SOURCE if beside else "note")
 
 
 def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
@@ -284,6 +297,17 @@ def _finite(path: Path, table: Table, row: int, column: int) -> float:
             f"{remedy}"
         )
     return value
+
+
+def places_of(episodes: Sequence[str], outcomes: Outcomes) -> dict[str, Place]:
+    """Return where each episode's object landed, if that is known, by the rule of `outcomes_of`."""
+    picked = _matched(episodes, outcomes.episodes)
+    rows = {episode: outcomes.episodes.index(name) for episode, name in picked.items()}
+    return {
+        episode: (*outcomes.values[row].tolist(), float(outcomes.sd[row]))
+        for episode, row in rows.items()
+        if np.all(np.isfinite(outcomes.values[row]))
+    }
 
 
 def missing_outcomes(episodes: Sequence[str], outcomes: Outcomes) -> list[str]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +15,8 @@ from jaxtyping import Float, Int
 
 from prior_reinforce.arm.recordings.fit import slips
 from prior_reinforce.arm.recordings.inspection import Inspection, in_rows, say_small
+from prior_reinforce.errors import WorkspaceError
+from prior_reinforce.files import named_disk_errors
 from prior_reinforce.generators.timing.events import find_transitions
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.terminal import plain
@@ -141,6 +145,22 @@ class Preview:
             if path is not None:
                 figure.savefig(path, format="png")
         return figure
+
+    def save(self, folder: Path) -> Path:
+        """Draw it into a folder, and return the picture's path.
+
+        Raises:
+            WorkspaceError: It cannot be written; an older picture is taken away.
+        """
+        picture = folder / "demonstrations.png"
+        try:
+            with named_disk_errors(folder):
+                self.draw(picture)
+        except WorkspaceError:
+            with suppress(OSError):
+                picture.unlink()
+            raise
+        return picture
 
     def _coverage(self) -> str:
         demos, points = self.demonstrations, self.demonstrations.outcomes_seen

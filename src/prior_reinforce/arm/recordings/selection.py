@@ -39,7 +39,7 @@ class Selection:
     recorded_units: tuple[str, ...]
     """Units in which they were recorded."""
     ambiguities: tuple[Ambiguity, ...] = ()
-    """Names and units that are only inferred."""
+    """Names and units, and of recordings that were read also times, that are only inferred."""
     remarks: tuple[str, ...] = ()
     """Warnings for a person."""
     other_unit: str = ""

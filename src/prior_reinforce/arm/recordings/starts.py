@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float
 
+from prior_reinforce.arm.recordings.appending import so_far
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.units import listed
 from prior_reinforce.arrays import Plans
@@ -37,7 +38,7 @@ def odd_starts(
     Demonstrations that were there `before` count as one group.
     """
     motions, n = [*before, *motions], len(before)
-    episodes = [*(f"demonstration {i} so far" for i in range(n)), *episodes]
+    episodes = [*so_far(n), *episodes]
     if len(motions) < 2:
         return
     starts = np.array([motion[0] for motion in motions])

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
+from prior_reinforce.arm.recordings.appending import so_far
 from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.selection import Selection
 from prior_reinforce.arm.recordings.units import listed
@@ -72,7 +73,7 @@ def aligned(
             turns an episode is in.
     """
     shown = () if before is None else before.plans
-    episodes = [*(f"demonstration {i} so far" for i in range(len(shown))), *selection.episodes]
+    episodes = [*so_far(len(shown)), *selection.episodes]
     motions = [*np.array(shown), *(np.array(each.positions) for each in selection.recordings)]
     form = with_turns(PlanFormat(selection.names, selection.units, 1.0), limits)
     recorded = zip(selection.names, selection.recorded_units, strict=True)

@@ -322,12 +322,9 @@ class Workspace:
 
         self.state.refuse_open_trial("importing demonstrations")
         wanted = self.wanted(preprocessing, append=append)
+        meant = {"joints": wanted.names, **options, **vars(wanted)}
         result = import_demonstrations(
-            source,
-            outcomes=outcomes,
-            outcome_unit=outcome_unit,
-            take_guesses=take_guesses,
-            **{"joints": wanted.names, **options, **vars(wanted)},
+            source, outcomes=outcomes, outcome_unit=outcome_unit, take_guesses=take_guesses, **meant
         )
         self.take_in(result, str(source), append=append)
         return result
@@ -337,18 +334,11 @@ class Workspace:
         from prior_reinforce.arm.recordings import Preprocessing, Wanted
 
         manifest, form = self.manifest, self.manifest.format
-        is_known = form.names != UNKNOWN
-        return Wanted(
-            form.names if is_known else None,
-            form.units if is_known else None,
-            manifest.outcome_format.names,
-            manifest.outcome_format.units,
-            dataclasses.replace(preprocessing or Preprocessing(), dt=form.dt),
-            manifest.robot,
-            manifest.gate,
-            manifest.declared,
-            self.demonstrations if append else None,
-        )
+        names, units = (None, None) if form.names == UNKNOWN else (form.names, form.units)
+        outcome, before = manifest.outcome_format, self.demonstrations if append else None
+        how = dataclasses.replace(preprocessing or Preprocessing(), dt=form.dt)
+        checks = manifest.robot, manifest.gate, manifest.declared
+        return Wanted(names, units, outcome.names, outcome.units, how, *checks, before)
 
     def take_in(self, result: ImportResult, source: str, *, append: bool = False) -> int:
         """Take in what an import made, in place of earlier demonstrations or beside them.
