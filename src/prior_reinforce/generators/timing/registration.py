@@ -44,8 +44,8 @@ CONVERGED = 1e-4
 """Lags that move by less are found, in frames. Ours: half of it moves plans by 2e-6 of a range."""
 _LAGS_PER_FRAME = 8
 """Lags are scanned on a grid this fine, which lies in the basin of Newton's method. Ours."""
-_SCANNED = 2**18
-"""Correlations that are scanned at once, 2 MB of them."""
+_SCANNED = 2**14
+"""Correlations that are scanned at once, 128 kB of them: a processor's cache holds these."""
 _NEWTON_STEPS = 4
 """Ours: two give the same plans to 2e-6 of a range, eight to 1e-9."""
 _UNLIKE = 1e-9
