@@ -71,7 +71,8 @@ def patterns(demonstrations: Demonstrations) -> tuple[tuple[int, ...], ...]:
     from scipy.sparse.csgraph import connected_components
 
     agree = unit_vectors @ unit_vectors.T > _AGREE
-    agree |= best_correlations(flat.reshape(velocities.shape)) > _AGREE_LATER
+    if not agree.all():  # else no delay has anything to add, and all are long to scan
+        agree |= best_correlations(flat.reshape(velocities.shape)) > _AGREE_LATER
     _, labels = connected_components(agree, directed=False)
     motions = _pooled(shapes, units, shapes.mean(axis=0))
     found = [

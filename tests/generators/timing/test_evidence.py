@@ -56,7 +56,8 @@ def test_of_many_some_tell_the_timing_by_which_all_are_learned():
     some = many.only(telling(40).tolist())
     choice, of_some = choose_timing(many), choose_timing(some)
     assert len(choice.decomposition.numbers) == 40
-    assert choice.errors == of_some.errors
+    # Channels are scaled by all, found from these same ones: from another scale to begin with.
+    assert choice.errors == pytest.approx(of_some.errors, rel=1e-6)
     assert choice.reason == of_some.reason
 
 

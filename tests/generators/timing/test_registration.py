@@ -173,7 +173,7 @@ def test_motions_are_compared_at_every_delay_without_all_of_their_scans_at_once(
     assert peak < all_at_once / 3
 
 
-def test_what_demonstrations_agree_in_is_found_once_for_all_warps(monkeypatch):
+def test_what_demonstrations_agree_in_is_found_once_for_all_warps_and_for_some(monkeypatch):
     demos, asked = demonstrations(swings()), []
     agree = registration._scaled_by_agreement
     monkeypatch.setattr(
@@ -181,7 +181,14 @@ def test_what_demonstrations_agree_in_is_found_once_for_all_warps(monkeypatch):
     )
     for kind in ("none", "start", "tempo"):
         decompose(demos, kind)
+        assert len(decompose(demos, kind, (3, 1)).numbers) == 2
     assert len(asked) == 1
+
+
+def test_some_of_the_demonstrations_start_as_they_do_among_all():
+    """They are swings of one shape, so that the others do not count."""
+    some = decompose(demonstrations(swings()), "start", (3, 1)).numbers[:, 0]
+    np.testing.assert_allclose(np.diff(some), STARTS[1] - STARTS[3], atol=0.02)
 
 
 def test_of_many_demonstrations_some_tell_how_to_learn_from_all():

@@ -96,10 +96,12 @@ def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
             f"timing: {_WORDS[usual.timeline.kind]}, as a rule; {n} demonstrations cannot tell "
             "what is better",
         )
-    some = telling(n)
-    told = demonstrations if len(some) == n else demonstrations.only(some.tolist())
+    some = telling(n).tolist()
+    told, of = demonstrations, list[tuple[int, ...]]()
+    if len(some) < n:
+        told, of = demonstrations.only(some), [tuple(some)]
     decompositions: dict[WarpKind, Decomposition] = {
-        kind: decompose(told, kind) for kind in _MAX_RELATIVE_ERROR
+        kind: decompose(demonstrations, kind, *of) for kind in _MAX_RELATIVE_ERROR
     }
     errors = {kind: outcome_error(told, each) for kind, each in decompositions.items()}
     able = [kind for kind in errors if kind == "start" or errors[kind] < _MAX_USEFUL_ERROR]

@@ -36,6 +36,8 @@ Warps = Float[np.ndarray, "N P"]
 """theta of each demonstration."""
 Profiles = Float[np.ndarray, "N H D"]
 """V, or velocity profiles that are not scaled yet."""
+Some = slice | list[int]
+"""Demonstrations that are registered, of those that are scaled together."""
 
 _MAX_ROUNDS = 50
 """Rounds of "re-estimate the template, move each demonstration to it". Ours: synthetic shifts and
@@ -44,8 +46,8 @@ CONVERGED = 1e-4
 """Lags that move by less are found, in frames. Ours: half of it moves plans by 2e-6 of a range."""
 _LAGS_PER_FRAME = 8
 """Lags are scanned on a grid this fine, which lies in the basin of Newton's method. Ours."""
-_SCANNED = 2**18
-"""Correlations that are scanned at once, 2 MB of them."""
+_SCANNED = 2**14
+"""Correlations that are scanned at once, 128 kB of them: a processor's cache holds these."""
 _NEWTON_STEPS = 4
 """Ours: two give the same plans to 2e-6 of a range, eight to 1e-9."""
 _UNLIKE = 1e-9
@@ -111,8 +113,8 @@ class Motions:
     decisive: Float[np.ndarray, " N"] | None
     """When a channel that jumps changes last, in frames; None where none does."""
 
-    def register(self, kind: WarpKind) -> tuple[Warps, bool]:
-        """Find the warp of each demonstration.
+    def register(self, kind: WarpKind, some: Some = slice(None)) -> tuple[Warps, bool]:
+        """Find the warp of each demonstration, or of some.
 
         Returns:
             theta, and whether the change of a channel that jumps is phase 0.
@@ -121,14 +123,16 @@ class Motions:
             InvalidDemonstrationsError: A demonstration does not move.
         """
         if kind == "none":
-            return np.zeros((len(self.profiles), 0)), False
-        profiles, starts = self._aligned
+            return np.zeros((len(self.profiles[some]), 0)), False
+        profiles = self._scaled[some]
         speeds = np.linalg.norm(profiles, axis=2)
+        starts = np.mean([middle(speed) for speed in speeds]) - correlation_lags(profiles)
         length = float(np.median([np.ptp(motion_span(speed)) for speed in speeds]))
         by_step = False
         if self.decisive is not None:
-            by_step = bool(np.std(self.decisive - starts) <= _GOES_WITH * length)
-            starts = self.decisive if by_step else starts
+            decisive = self.decisive[some]
+            by_step = bool(np.std(decisive - starts) <= _GOES_WITH * length)
+            starts = decisive if by_step else starts
         if kind == "tempo":
             return _tempos(profiles, starts, length), by_step
         if not by_step:
@@ -136,15 +140,13 @@ class Motions:
         return starts[:, None], by_step
 
     @cached_property
-    def _aligned(self) -> tuple[Profiles, Float[np.ndarray, " N"]]:
-        """Profiles that are scaled by agreement, and the starts at which they agree best."""
+    def _scaled(self) -> Profiles:
+        """Profiles that are scaled by how well all of them agree."""
         if not np.all(np.linalg.norm(self.profiles, axis=2).max(axis=1) > 0):
             raise InvalidDemonstrationsError(
                 "a demonstration does not move, so it cannot be timed; drop it"
             )
-        profiles = _scaled_by_agreement(self.profiles)
-        middles = [middle(speed) for speed in np.linalg.norm(profiles, axis=2)]
-        return profiles, np.mean(middles) - correlation_lags(profiles)
+        return _scaled_by_agreement(self.profiles)
 
 
 def _scaled_by_agreement(profiles: Profiles) -> Profiles:

@@ -197,8 +197,15 @@ class Decomposition:
 
 
 @lru_cache(maxsize=8)  # patterns, the choice of timing and the generator ask for the same one
-def decompose(demonstrations: Demonstrations, kind: WarpKind) -> Decomposition:
+def decompose(
+    demonstrations: Demonstrations, kind: WarpKind, some: tuple[int, ...] = ()
+) -> Decomposition:
     """Find the warp of each demonstration, and its shape on the common phase.
+
+    Args:
+        demonstrations: All of them tell noise, jumps and how channels are scaled.
+        kind: What warps may do.
+        some: Numbers of those that are decomposed; all if none is given.
 
     Returns:
         The decomposition; of kind `none` where what was asked for would lose part of the motion.
@@ -209,7 +216,9 @@ def decompose(demonstrations: Demonstrations, kind: WarpKind) -> Decomposition:
     signals, horizon = demonstrations.signals, demonstrations.horizon
     units = demonstrations.format.units
     plans, came, motions = _motions(demonstrations)
-    warps, by_step = motions.register(kind)
+    rows = list(some) or slice(None)
+    plans, came = plans[rows], {d: each[rows] for d, each in came.items()}
+    warps, by_step = motions.register(kind, rows)
     # Whole frames, so that a transition is reproduced as recorded.
     times = {d: np.round(each).astype(int) for d, each in came.items() if each.shape[1]}
     steps = tuple(
@@ -239,7 +248,8 @@ def decompose(demonstrations: Demonstrations, kind: WarpKind) -> Decomposition:
         highest=tuple((numbers.max(axis=0) + spread).tolist()),
         pose_band=tuple(signals.pose_band.tolist()),
     )
-    extrapolated = ExtrapolatedPlans(plans, signals.jumps, np.linalg.norm(motions.profiles, axis=2))
+    speeds = np.linalg.norm(motions.profiles[rows], axis=2)
+    extrapolated = ExtrapolatedPlans(plans, signals.jumps, speeds)
     size = largest_of_unit(np.ptp(plans, axis=(0, 1)), units)
     size = np.where(size > 0, size, 1.0)
     for per_frame in _OVERSAMPLING:
@@ -264,7 +274,7 @@ def decompose(demonstrations: Demonstrations, kind: WarpKind) -> Decomposition:
         if exact:
             break
     if kind != "none" and np.any(off > _LOSSY * size):
-        return decompose(demonstrations, "none")
+        return decompose(demonstrations, "none", some)
     of_channels = timeline.names(demonstrations.format)[1][: shapes.shape[2]]
     return Decomposition(timeline, shapes, of_channels, numbers, by_step, exact)
 
