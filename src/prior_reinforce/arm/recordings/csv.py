@@ -178,12 +178,10 @@ def _episode(
     _refuse_text(table, joints or (), names, found or ())
     blank = [not any(table.cells[i][row] for i in found or ()) for row in range(len(table))]
     if found and _MERGED <= np.mean(blank) < 1:
-        own = [row for row in range(len(table)) if not blank[row]]
+        rows = table.rows([row for row in range(len(table)) if not blank[row]])
         remark = f"{sum(blank)} rows left out, in which no joint has a value, as of a merged log"
         said_of_all = (*said_of_all, remark)
-        return _episode(
-            table.rows(own), episode, options, episode_column, guessed, above, said_of_all
-        )
+        return _episode(rows, episode, options, episode_column, guessed, above, said_of_all)
     if found and not options.key and {*found} <= {*others}:
         channels = found
     elif table.named and (keys := options.key or ((log.key,) if log else ())):
