@@ -97,6 +97,6 @@ def test_a_row_a_form_and_what_is_known_before_the_gate_in_words():
     (row,) = RECIPE.table(results).rows
     assert [cell.split()[0] for cell in row[:3]] == ["loop", "2.00", "4.00"]
     known, others, gate = RECIPE.remarks(results)
-    assert others.endswith("10,000 steps 7.00 5.00.")
+    assert others.endswith("10,000 steps 7.00, 5.00.")
     assert known.endswith("raw 2.0.")
     assert gate.endswith("raw 0.50 and 1.00.")

@@ -185,7 +185,7 @@ def remarks(results: Results) -> list[str]:
     ]
     on_v1 = results.where(task=_VARIANTS["V1"]).having("failed_readings").by("method")
     others = [
-        " ".join([form, *(str(on_v1[f"{form}: {of}"].mean(TRIALS)) for of in (LOOP, ONE_NOISE))])
+        f"{form} " + ", ".join(str(on_v1[f"{form}: {of}"].mean(TRIALS)) for of in (LOOP, ONE_NOISE))
         for form in _OTHERS
         if f"{form}: {ONE_NOISE}" in on_v1
     ]
