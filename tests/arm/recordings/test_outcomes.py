@@ -5,6 +5,7 @@ import pytest
 
 from prior_reinforce.arm.recordings import import_demonstrations
 from prior_reinforce.arm.recordings.outcomes import (
+    Outcomes,
     check_rows,
     digits_at_end,
     keep_places,
@@ -387,3 +388,9 @@ def test_places_that_are_kept_are_read_again(tmp_path):
 def test_two_episodes_of_one_number_have_no_place_by_it(tmp_path):
     keep_places(tmp_path / "t.csv", {"1": (0.1, 0.2, 0.0)}, OutcomeFormat.metres(2))
     assert places_of(["a_1", "b_1"], read_outcomes(tmp_path / "t.csv")) == {}
+
+
+def test_rows_may_be_called_by_the_files_of_the_recordings():
+    rows = Outcomes("o.csv", ("rec/throw_a.csv", "Throw_b.MP4"), np.eye(2), np.zeros(2))
+    assert missing_outcomes(["throw_a", "Throw_b"], rows) == []
+    assert missing_outcomes(["throw_c"], rows) == ["throw_c"]

@@ -81,3 +81,9 @@ def test_units_in_the_names_are_taken_out_of_them():
     assert recording.units == ("cm", "deg", None)
     both = Recording("a", [0, 1], np.zeros((2, 2)), ("x_cm", "x_mm"))
     assert both.names == ("x_cm", "x_mm")
+
+
+def test_frames_in_columns_are_refused_as_such():
+    """As MATLAB's arrays lie in its HDF5."""
+    with pytest.raises(InvalidDemonstrationsError, match="6 frames of 180 numbers each"):
+        Recording("a", np.arange(6.0), np.ones((6, 180)))

@@ -192,6 +192,12 @@ def keep_places(
         write_outcome_table(table, rows, *heads, beside=SOURCE if beside else "note")
 
 
+_FILE = re.compile(
+    r"(?:.*[/\\])?([^/\\]+)\.(?:csv|txt|npz|npy|hdf5|h5|bag|mcap|db3|mp4|jpe?g|png)", re.IGNORECASE
+)
+"""Path of a recording, or of what was filmed beside it."""
+
+
 def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
     """Read a table of outcomes, a CSV of any dialect; rows with empty cells are skipped.
 
@@ -407,12 +413,18 @@ def outcomes_of(
 
 
 def _matched(episodes: Sequence[str], names: Sequence[str]) -> dict[str, str]:
-    """Name in the table by episode; a number at the end of two names matches none."""
+    """Name in the table by episode; a number at the end of two names matches none.
+
+    An episode may be called by its file, `throw_0.csv`.
+    """
+    stems = [_FILE.sub(r"\1", name) for name in names]
     numbers, there = list(map(digits_at_end, episodes)), list(map(digits_at_end, names))
     picked: dict[str, str] = {}
     for episode, number in zip(episodes, numbers, strict=True):
         if episode in names:
             picked[episode] = episode
+        elif stems.count(episode) == 1:
+            picked[episode] = names[stems.index(episode)]
         elif number and numbers.count(number) == 1 and there.count(number) == 1:
             picked[episode] = names[there.index(number)]
     return picked

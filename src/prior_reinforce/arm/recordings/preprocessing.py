@@ -208,8 +208,8 @@ def copies(plans: Plans, names: Sequence[str]) -> str:
         if other != name:
             return (
                 f"{other} and {name} are one motion to the last number; if a file was copied, drop "
-                "it, and if one plan was executed twice, give it once, with the middle of where it "
-                "landed (--leave-out)"
+                "it; if one plan was executed twice, give it once, with the middle of where it "
+                "landed (--leave-out); else what was taken is no motion: see the channels"
             )
     return ""
 

@@ -35,6 +35,8 @@ Episodes = Iterable[tuple[str, Callable[[], "Recording"]]]
 _POINTER = b"version https://git-lfs.github.com/spec/"
 _LARGEST_POINTER, _MOST_FILES = 1024, 5_000
 """Bytes of a Git LFS pointer (its specification), and files that are looked through for one."""
+_WIDER = 5
+"""Times as many columns without names as frames that no motion has. Ours."""
 _LEAP = 3.0
 """Steps of a motion, as large as its largest, that make a leap. Ours."""
 EPISODE_COLUMNS = tuple(
@@ -114,6 +116,11 @@ class Recording:
                 f"{episode} has times {times.shape} and positions {positions.shape} for "
                 f"{len(names)} channels; expected (T,) and (T, {len(names)}) with T >= 2: mend or "
                 "drop it"
+            )
+        if not (self.named and self.names) and width > _WIDER * times.size:
+            raise InvalidDemonstrationsError(
+                f"{episode} has {times.size} frames of {width} numbers each, as a motion has whose "
+                "rows and columns are exchanged: save it with a row a frame"
             )
         repeated = [name for name, count in Counter(names).items() if count > 1]
         if repeated:

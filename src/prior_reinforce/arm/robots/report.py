@@ -169,5 +169,5 @@ class LimitReport:
             raise RobotLimitError(
                 f"plan refused for {self.robot}: {self.refusals}. Plans are never clipped or "
                 "slowed down: choose another goal or --generator, demonstrate gentler motions, or, "
-                "if the recordings are noisy, import them with --smooth 20"
+                "if the recordings are noisy, import them with --smooth 20 or less"
             )
