@@ -391,6 +391,7 @@ def test_two_episodes_of_one_number_have_no_place_by_it(tmp_path):
 
 
 def test_rows_may_be_called_by_the_files_of_the_recordings():
-    rows = Outcomes("o.csv", ("rec/throw_a.csv", "Throw_b.MP4"), np.eye(2), np.zeros(2))
+    named = ("rec/throw_a.csv", "Throw_b.MP4")
+    rows = Outcomes("o.csv", named, np.eye(2), np.zeros(2), ("x", "y"), (None, None))
     assert missing_outcomes(["throw_a", "Throw_b"], rows) == []
     assert missing_outcomes(["throw_c"], rows) == ["throw_c"]
