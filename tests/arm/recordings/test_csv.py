@@ -436,3 +436,11 @@ def test_hidden_files_beside_recordings_are_none(tmp_path):
     write_csv(tmp_path)
     (tmp_path / "._0.csv").write_bytes(b"\0\5\26\7")
     assert len(read_recordings(tmp_path)) == N
+
+
+def test_a_first_frame_without_a_number_is_no_line_of_names(tmp_path):
+    rows = [f"2026-05-03T14:02:03.{k:02d}0,{k if k else 'nan'},{k}" for k in range(9)]
+    rows[0] = rows[0].replace(",0", ",NaN")
+    (tmp_path / "a.csv").write_text("\n".join(["time,pan,lift", *rows]))
+    (read,) = read_recordings(tmp_path / "a.csv")
+    assert (read.names, len(read.times)) == (("pan", "lift"), 9)

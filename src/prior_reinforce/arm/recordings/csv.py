@@ -41,7 +41,7 @@ from prior_reinforce.arm.recordings.table_times import (
     time_columns,
     with_whole_dates,
 )
-from prior_reinforce.arm.recordings.tables import Table, is_unnamed, read_table
+from prior_reinforce.arm.recordings.tables import Table, is_unnamed, is_value, read_table
 from prior_reinforce.arm.recordings.units import Ambiguity, say_names
 from prior_reinforce.errors import FileFormatError
 
@@ -232,13 +232,15 @@ def _episode(
 def _with_one_head(table: Table) -> Table:
     """Join further lines of names, as pandas writes of columns of several levels: `elbow/position`.
 
-    Such lines hold no number, and the line after them does.
+    Such lines hold no number, date or `nan`, and the line after them does hold a number.
     """
     are_numbers = ~np.isnan(table.values)
     rows = int(np.argmax(are_numbers.any(axis=1))) if table.named and are_numbers.size else 0
     if rows == 0:
         return table
     levels = [[name, *own[:rows]] for name, own in zip(table.names, table.cells, strict=True)]
+    if any(is_value(cell) for level in levels for cell in level[1:]):
+        return table
     names = tuple("/".join(filter(None, level)) for level in levels)
     return replace(table.rows(range(rows, len(table))), names=names)
 

@@ -58,6 +58,7 @@ _OF_AN_OFFICE = re.compile(
 )
 """`11/26/2026 1:05:09.3 PM`, `26.11.2026 13:05:09`: as office programs write them."""
 _SPAN = re.compile(r"([+-]?)(?:(\d+) days? \+?)?(\d+):([0-5]\d):([0-5]\d)(?:[.,](\d{1,9})\d*)?")
+_NAN = ("nan", "+nan", "-nan")
 _DAY = 86_400 * 10**9
 """In [ns]."""
 _SECOND_ROW_OF_UNITS = re.compile(r"[\[(]?[A-Za-zµμ°/^*·0-9.%-]{0,12}[\])]?")
@@ -101,7 +102,7 @@ class Table:
         """Return a column as numbers; FileFormatError names the line of a cell that is none."""
         for i in np.flatnonzero(np.isnan(self.values[:, column])).tolist():
             text = self.cells[column][i]
-            if text.lower() not in ("nan", "+nan", "-nan"):
+            if text.lower() not in _NAN:
                 raise FileFormatError(
                     f"{self.where}, line {self.lines[i]}: {self.names[column]} is {text[:40]!r}, "
                     "expected a number; mend that cell, or keep other columns"
@@ -278,6 +279,11 @@ def _span(text: str) -> int | None:
     days, hours, minutes, seconds = (int(part or 0) for part in found.groups()[1:5])
     whole = ((24 * days + hours) * 60 + minutes) * 60 + seconds
     return (whole * 10**9 + int((found[6] or "").ljust(9, "0"))) * (-1 if found[1] == "-" else 1)
+
+
+def is_value(text: str) -> bool:
+    """Whether a cell is `nan`, a date or a time of day, and so no name."""
+    return _DATE.match(text) is not None or text.lower() in _NAN
 
 
 def _is_number(text: str, decimal: str) -> bool:
