@@ -269,7 +269,7 @@ def _refuse_text(
     """FileFormatError if joints are texts: names in a column of their own, or `True`, `False`."""
     opens = Kind.TOOL in kinds(joints)
     for i, cells in enumerate(table.cells):
-        if joints and {*joints} <= {*cells}:
+        if len(joints) > 1 and {*joints} <= {*cells}:
             raise FileFormatError(
                 f"{table.where}: each row is of one joint, which {names[i]} names; write a row a "
                 "frame and a column a joint: pandas' DataFrame.pivot(index=TIME, columns="
