@@ -157,3 +157,8 @@ def test_the_only_opening_of_a_gripper_is_the_gripper(there, found):
 def test_a_list_of_texts_in_any_form(said):
     assert words(said) == UR
     assert words(np.arange(3)) == ()
+
+
+def test_a_channel_is_of_the_joint_whose_whole_name_it_has():
+    there = ("Wrist_Pitch.pos", "Pitch.pos")
+    assert find_channels(("Pitch", "Wrist_Pitch"), there) == [1, 0]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.arm.robots import RobotLimits, match_joints, missing_joints, robot_limits
-from prior_reinforce.arm.robots.limits import is_joint, other_quantities
+from prior_reinforce.arm.robots.limits import is_joint, joint_of, other_quantities
 from prior_reinforce.errors import ConfigurationError, InvalidPlanError
 from prior_reinforce.plans.plan_format import PlanFormat
 
@@ -76,6 +76,17 @@ def test_joints_are_matched_by_name_and_never_guessed():
         matched("left_joint1", "right_joint1")
     with pytest.raises(InvalidPlanError, match="joint1 is in 'deg'"):
         matched("joint1", units=("deg",))
+
+
+def test_a_joint_whose_name_ends_anothers_is_itself():
+    """Pitch and Wrist_Pitch of an SO-ARM100."""
+    names = ("Pitch", "Wrist_Pitch")
+    ends = np.array([1.0, 3.0])
+    two = RobotLimits("so", "any", "made up", names, -ends, ends, np.array([2.0, 2.0]))
+    form = PlanFormat(("Wrist_Pitch.pos", "Pitch"), ("rad", "rad"), 0.01)
+    assert match_joints(form, two) == {0: 1, 1: 0}
+    assert joint_of("left_Wrist_Pitch", names) == 1
+    assert joint_of("Pitch", names[1:]) is None
 
 
 def test_joints_without_a_column_are_missing_unless_left_out_on_purpose():

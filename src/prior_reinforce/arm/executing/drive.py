@@ -41,7 +41,7 @@ from prior_reinforce.arm.executing.result import (
 )
 from prior_reinforce.arm.robots.gate import check_plan
 from prior_reinforce.arm.robots.gate_settings import GateSettings
-from prior_reinforce.arm.robots.limits import RobotLimits, is_joint, with_turns
+from prior_reinforce.arm.robots.limits import RobotLimits, joint_of, with_turns
 from prior_reinforce.arm.robots.plan_files import read_plan
 from prior_reinforce.errors import (
     ConfigurationError,
@@ -159,14 +159,15 @@ def arms_columns(form: PlanFormat, arm: ArmDescription) -> list[int]:
     """
     channels = []
     for name, unit in zip(form.names, form.units, strict=True):
-        found = [i for i, own in enumerate(arm.columns) if name == own or is_joint(name, own)]
-        if not found or arm.units[found[0]] != unit:
+        own = arm.columns
+        channel = own.index(name) if name in own else joint_of(name, own)
+        if channel is None or arm.units[channel] != unit:
             has = ", ".join(map("{} [{}]".format, arm.columns, arm.units))
             raise InvalidPlanError(
                 f"{arm.model} has no channel for {name} [{unit}]; it has {has}: name [plan]'s "
                 "columns so"
             )
-        channels.append(found[0])
+        channels.append(channel)
     if len(set(channels)) < len(channels):
         raise InvalidPlanError(f"two of {form.names} are one channel of {arm.model}; drop one")
     return channels

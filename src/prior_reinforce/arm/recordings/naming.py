@@ -36,14 +36,14 @@ def find_channels(wanted: Sequence[str], there: Sequence[str]) -> list[int] | No
     `joint4` is also `panda_joint4` and `joint4.pos`, and vice versa (`robots.limits.is_joint`).
     InvalidDemonstrationsError if two channels look like one joint.
     """
-    found = [_find(name, there) for name in wanted]
+    found = [_find(name, there, wanted) for name in wanted]
     picked = [index for index in found if index is not None]
     return picked if len(picked) == len(wanted) else None
 
 
 def missing_channels(wanted: Sequence[str], there: Sequence[str]) -> list[str]:
     """Return the wanted joints that are missing, by the rule of `find_channels`."""
-    return [name for name in wanted if _find(name, there) is None]
+    return [name for name in wanted if _find(name, there, wanted) is None]
 
 
 def vectors(names: Sequence[str]) -> dict[str, list[int]]:
@@ -142,13 +142,16 @@ def _numbers_its_names(said: Mapping[Any, Any]) -> bool:
     return len(numbers) == len(said) and sorted(numbers) == list(range(len(said)))
 
 
-def _find(name: str, there: Sequence[str]) -> int | None:
+def _find(name: str, there: Sequence[str], wanted: Sequence[str]) -> int | None:
     bare = split_unit(name, CHANNEL_UNITS)[0]
     for exact in (name, bare):
         if exact in there:
             return there.index(exact)
     names = [_OF_POSITIONS.sub("", split_unit(channel, CHANNEL_UNITS)[0]) for channel in there]
     found = [i for i, other in enumerate(names) if is_joint(other, bare) or is_joint(bare, other)]
+    # `Wrist_Pitch.pos` is no `Pitch` beside a `Wrist_Pitch`.
+    longer = [joint for joint in wanted if len(joint) > len(bare)]
+    found = [i for i in found if not any(is_joint(names[i], joint) for joint in longer)]
     if len(found) > 1:
         raise InvalidDemonstrationsError(
             f"{say_names([there[i] for i in found])} all look like {name}; name the recorded ones "

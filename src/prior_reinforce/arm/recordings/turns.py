@@ -21,7 +21,7 @@ from prior_reinforce.arm.recordings.appending import so_far
 from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.selection import Selection
 from prior_reinforce.arm.recordings.units import listed
-from prior_reinforce.arm.robots.limits import RobotLimits, is_joint, with_turns
+from prior_reinforce.arm.robots.limits import RobotLimits, joint_of, with_turns
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.plan_format import PlanFormat
@@ -370,11 +370,10 @@ class _Together:
 
 def _range(name: str, limits: RobotLimits | None) -> tuple[float, float]:
     """Where a channel may be; anywhere if it is no joint of the robot."""
-    if limits is not None:
-        for joint, low, high in zip(limits.joint_names, limits.lower, limits.upper, strict=True):
-            if is_joint(name, joint):
-                return float(low), float(high)
-    return -np.inf, np.inf
+    joint = None if limits is None else joint_of(name, limits.joint_names)
+    if limits is None or joint is None:
+        return -np.inf, np.inf
+    return float(limits.lower[joint]), float(limits.upper[joint])
 
 
 def _continued(values: Channel, turn: float, beside: float) -> Channel:

@@ -147,6 +147,15 @@ def is_joint(column: str, joint: str) -> bool:
     return False
 
 
+def joint_of(column: str, joints: Sequence[str]) -> int | None:
+    """Return which joint a column moves, by `is_joint`; None if none.
+
+    Of joints of which one's name ends another's, `Pitch` and `Wrist_Pitch`, it is the longer one.
+    """
+    found = [i for i, joint in enumerate(joints) if is_joint(column, joint)]
+    return max(found, key=lambda i: len(joints[i]), default=None)
+
+
 def other_quantities(format: PlanFormat, limits: RobotLimits) -> tuple[str, ...]:
     """Columns that name a joint of the robot and, beside it, another quantity than its position."""
     return tuple(
@@ -171,8 +180,9 @@ def match_joints(format: PlanFormat, limits: RobotLimits) -> dict[int, int]:
         InvalidPlanError: Two columns look like one joint, or a joint is in another unit than [rad].
     """
     columns: dict[int, int] = {}
+    of_joint = [joint_of(column, limits.joint_names) for column in format.names]
     for joint, name in enumerate(limits.joint_names):
-        found = [i for i, column in enumerate(format.names) if is_joint(column, name)]
+        found = [i for i, own in enumerate(of_joint) if own == joint]
         if len(found) > 1:
             raise InvalidPlanError(
                 f"columns {[format.names[i] for i in found]} all look like {name} of "
@@ -196,9 +206,8 @@ def with_turns(format: PlanFormat, limits: RobotLimits | None) -> PlanFormat:
     """
     endless = {
         column: limits.upper[joint] - limits.lower[joint] > 1.99 * ENDLESS
-        for joint, name in enumerate(limits.joint_names if limits is not None else ())
         for column in format.names
-        if limits is not None and is_joint(column, name)
+        if limits is not None and (joint := joint_of(column, limits.joint_names)) is not None
     }
     own = [column for column in format.names if endless.get(column)]
     named = [n for n in whole_circles(format.names, format.units) if n not in endless]
