@@ -235,6 +235,13 @@ def test_what_is_wrong_in_a_urdf_is_named(tmp_path, old, new, says):
         read_urdf(path, "tool0")
 
 
+def test_links_that_no_arm_has_are_in_another_unit(tmp_path):
+    path = write_urdf(tmp_path / "a.urdf", ur5e())
+    path.write_text(path.read_text().replace("-0.425", "-4.25"))
+    with pytest.raises(ConfigurationError, match=r"elbow_joint stands 4\.25 m from the joint"):
+        read_urdf(path)
+
+
 def test_soft_limits_narrow_a_joints_range(tmp_path):
     path = write_urdf(tmp_path / "a.urdf", SMALL)
     soft = '<safety_controller soft_lower_limit="-1" soft_upper_limit="9" k_velocity="1"/></joint>'

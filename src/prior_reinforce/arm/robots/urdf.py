@@ -30,6 +30,8 @@ _JAW = re.compile("grip|jaw|finger|claw|knuckle|thumb|pinch|tong", re.IGNORECASE
 _JAW_MESH = re.compile("jaw|finger|claw|thumb|pinch", re.IGNORECASE)
 """Of a mesh's file name, which may be the only one that a CAD program's export leaves telling."""
 _OF_AN_ARM = re.compile("wrist|elbow|shoulder|arm|roll|pitch|yaw|rotat", re.IGNORECASE)
+_LONGEST_LINK = 3.0
+"""Between two joints of an arm, in [m]. Ours: the largest on the market have 1.7."""
 
 
 def read_urdf(
@@ -299,6 +301,11 @@ def _chain(joints: Sequence[Joint], hold: Mapping[str, float], upright: np.ndarr
     for joint in joints:
         since = since @ joint.pose(hold.get(joint.name))
         if joint.type in TURNING and joint.name not in hold:
+            if origins and np.linalg.norm(since[:3, 3]) > _LONGEST_LINK:
+                raise joint.error(
+                    f"stands {np.linalg.norm(since[:3, 3]):.3g} m from the joint before it, and no "
+                    "arm has such a link: URDF is in m, so divide what is in cm or mm"
+                )
             origins.append(_pose(since))
             axes.append(joint.axis())
             since = np.eye(4)

@@ -170,7 +170,10 @@ class Joint:
         roll, pitch, yaw = self.vector("origin", "rpy")
         pose[:3, :3], pose[:3, 3] = rotation(roll, pitch, yaw), self.vector("origin", "xyz")
         if np.abs(pose[:3, 3]).max() > _FARTHEST or max(map(abs, (roll, pitch, yaw))) > 7:
-            raise self.error(f"has an <origin> beyond {_FARTHEST:g} m or a turn; look for its dots")
+            raise self.error(
+                f"has an <origin> beyond {_FARTHEST:g} m or a turn; URDF is in m and rad: convert "
+                "what is in other units, and look for lost dots"
+            )
         if position and self.type in TURNING:
             pose[:3, :3] = pose[:3, :3] @ rotations_about(self.axis(), np.array([position]))[0]
         elif position and self.type == "prismatic":
