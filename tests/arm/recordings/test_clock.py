@@ -90,6 +90,8 @@ def test_a_column_that_counts_frames_needs_the_rate():
     (doubt,) = clock_of("a", 3, stamps=np.array([7, 8, 9]), name="t").ambiguities
     assert "or it counts frames" in doubt.what
     # What is not even called a time more probably counts.
+    (doubt,) = clock_of("a", 3, stamps=np.array([7, 8, 9]), name="ms").ambiguities
+    assert doubt.option == "--time-unit ms"
     (doubt,) = clock_of("a", 3, stamps=np.array([7, 8, 9]), name="X").ambiguities
     assert (doubt.option, doubt.guessed) == ("--time-unit frame --rate HZ", False)
 

@@ -416,6 +416,12 @@ def test_rows_of_another_log_that_was_merged_are_left_out(tmp_path):
     (read,) = read_recordings(tmp_path / "a.csv", joints=["pan", "lift"])
     np.testing.assert_allclose(read.times, np.arange(20) / 100)
     assert "20 rows left out, in which no joint has a value" in read.remarks[0]
+    # A recorder that loses the joints goes on writing the force.
+    lines = ["time,pan,lift,force", *(f"{k / 100},{k},{-k},5.0" for k in range(20))]
+    lines[5:12] = [f"{k / 100},,,5.0" for k in range(4, 11)]
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    with pytest.raises(FileFormatError, match="line 6: pan is ''"):
+        read_recordings(tmp_path / "a.csv", joints=["pan", "lift"])
 
 
 @pytest.mark.parametrize(
@@ -430,6 +436,21 @@ def test_joints_in_cells_and_switches_in_words_are_told_as_such(tmp_path, head, 
     (tmp_path / "a.csv").write_text("\n".join([head, *lines]))
     with pytest.raises(FileFormatError, match=says):
         read_recordings(tmp_path / "a.csv", joints=["pan", "lift"])
+
+
+def test_words_beside_a_gripper_of_numbers_are_left_out(tmp_path):
+    lines = ["time,pan,gripper_pos,gripper_closed"]
+    lines += [f"{k / 10},{k},{k / 10},{k > 4}" for k in range(10)]
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    (read,) = read_recordings(tmp_path / "a.csv", joints=["pan", "gripper"])
+    assert "gripper_pos" in read.names
+
+
+def test_columns_without_names_are_numbered_as_in_the_file(tmp_path):
+    rows = [f"{k / 10},,{k},{-k}" for k in range(6)]
+    (tmp_path / "a.csv").write_text("\n".join(rows))
+    (read,) = read_recordings(tmp_path / "a.csv", time_column="1")
+    assert (read.names, read.named) == (("column3", "column4"), False)
 
 
 def test_hidden_files_beside_recordings_are_none(tmp_path):

@@ -162,3 +162,4 @@ def test_a_list_of_texts_in_any_form(said):
 def test_a_channel_is_of_the_joint_whose_whole_name_it_has():
     there = ("Wrist_Pitch.pos", "Pitch.pos")
     assert find_channels(("Pitch", "Wrist_Pitch"), there) == [1, 0]
+    assert find_channels(("Pitch",), there) == [1]

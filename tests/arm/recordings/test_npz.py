@@ -244,6 +244,13 @@ def test_three_numbers_of_a_place_are_called_by_their_key(tmp_path):
     assert read.names[:4] == ("eef_pos_x", "eef_pos_y", "eef_pos_z", "quat_0")
 
 
+def test_a_rate_that_the_file_says_is_that_of_frames_that_are_counted(tmp_path):
+    q = sampled(0, 50)[1]
+    np.savez(tmp_path / "a.npz", q=q, frame=np.arange(len(q)), fps=50)
+    (read,) = read_recordings(tmp_path / "a.npz", time_column="frame", time_unit="frame")
+    np.testing.assert_allclose(read.times, np.arange(len(q)) / 50)
+
+
 @pytest.mark.parametrize(
     ("keys", "names"),
     [

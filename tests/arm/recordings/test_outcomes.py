@@ -5,7 +5,6 @@ import pytest
 
 from prior_reinforce.arm.recordings import import_demonstrations
 from prior_reinforce.arm.recordings.outcomes import (
-    Outcomes,
     check_rows,
     digits_at_end,
     keep_places,
@@ -390,8 +389,10 @@ def test_two_episodes_of_one_number_have_no_place_by_it(tmp_path):
     assert places_of(["a_1", "b_1"], read_outcomes(tmp_path / "t.csv")) == {}
 
 
-def test_rows_may_be_called_by_the_files_of_the_recordings():
-    named = ("rec/throw_a.csv", "Throw_b.MP4")
-    rows = Outcomes("o.csv", named, np.eye(2), np.zeros(2), ("x", "y"), (None, None))
-    assert missing_outcomes(["throw_a", "Throw_b"], rows) == []
-    assert missing_outcomes(["throw_c"], rows) == ["throw_c"]
+def test_rows_may_be_called_by_the_files_of_the_recordings(tmp_path):
+    (tmp_path / "o.csv").write_text(
+        "episode,x,y\nrec/throw_1.csv,1,2\nThrow_b.MP4,3,4\nc.csvx,5,6\n"
+    )
+    rows = read_outcomes(tmp_path / "o.csv")
+    assert rows.episodes == ("throw_1", "Throw_b", "c.csvx")
+    assert missing_outcomes(["demo_001", "Throw_b", "demo_4"], rows) == ["demo_4"]

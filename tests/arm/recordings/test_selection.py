@@ -80,7 +80,11 @@ def test_columns_without_names_are_no_joint_whatever_the_plans_are_called():
     joints = ("joint1", "joint2")
     with pytest.raises(InvalidDemonstrationsError, match="3 columns without names, and the plan 2"):
         select([Recording("throw", T, q)], names=joints, joints=joints)
-    for said in (["gripper", "joint1", "joint2"], ["column2", "column3"]):
+    for said in (
+        ["gripper", "joint1", "joint2"],
+        ["gripper", "arm_joint1", "arm_joint2"],
+        ["column2", "column3"],
+    ):
         (taken,) = select([Recording("throw", T, q)], said, joints).recordings
         np.testing.assert_array_equal(taken.positions, q[:, 1:])
     several = ["mm", "deg", "rad"]

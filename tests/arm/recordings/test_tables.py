@@ -214,3 +214,10 @@ def test_a_time_of_day_goes_on_at_midnight(tmp_path):
     (tmp_path / "a.csv").write_text("clock,a\n23:59:59.5,1\n00:00:00,2\n00:00:00.5,3\n")
     times = read_table(tmp_path / "a.csv").stamps(0)
     np.testing.assert_array_equal(times, [0, 5e8, 1e9])
+    # A date says its day, and a span none.
+    for cells, step in (
+        ("2026-05-03 14:02,2026-05-02 14:02", -86400),
+        ("26:00:00,00:00:00", -93600),
+    ):
+        (tmp_path / "a.csv").write_text("clock,a\n{},1\n{},2\n".format(*cells.split(",")))
+        assert read_table(tmp_path / "a.csv").stamps(0)[1] == step * 1e9

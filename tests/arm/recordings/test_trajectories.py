@@ -54,6 +54,10 @@ def test_points_of_a_controllers_rate_and_points_without_velocities_are_the_fram
     close, bare = np.arange(0, 1, 0.01), [0.0, 0.5, 1.0]
     assert len(read(message(close, of, velocities)).times) == 100
     assert len(read(message(bare, of)).times) == 3
+    nothing = [lambda t: np.nan] * 2
+    assert len(read(message(bare, of, nothing)).times) == 3
+    even = read(message([0.0, 0.03, 0.07], of, velocities)).times
+    np.testing.assert_allclose(np.diff(even), 0.01)
 
 
 def test_a_trajectory_that_lasts_for_ever_is_refused():

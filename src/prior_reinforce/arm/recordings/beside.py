@@ -114,8 +114,8 @@ def arrays_beside(
         if values.dtype.kind not in "biuf" or not values.size or not (may or values.ndim == 1):
             continue
         numbers = values.reshape(len(values), -1).astype(np.float64)
-        own = (columns or {}).get(name) or [f"{name}[{i}]" for i in range(width)]
-        own = own if width > 1 else [name]
+        numbered = [f"{name}[{i}]" for i in range(width)]
+        own = (columns or {}).get(name, numbered) if width > 1 else [name]
         moving = [i for i, column in enumerate(numbers.T) if may and _moves(column)]
         at, rate, along = times, "", numbers
         if moving and len(values) != len(motion):

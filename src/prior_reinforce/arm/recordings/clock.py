@@ -286,17 +286,15 @@ def clock_among(
     name counts more.
     """
     asked = options.time_column
-    own = {} if asked is not None else declared_rate(where, said or {}, options.rate)
     there = {name: a.ravel() if a.size == count else a for name, a in arrays.items()}
     fit = [name for name, array in there.items() if array.shape == (count,)]
     times = [n for n in there if split_unit(n, SECONDS)[0] in _CALLED]
     times += [n for n in fit if n not in times and tells_time(n, there[n])]
-    if asked is not None:
-        if asked not in (*there, NO_COLUMN):
-            raise FileFormatError(
-                f"{where} has no array {asked}; it holds {sorted(arrays)}: name one"
-            )
-        times = [n for n in there if n == asked]
+    if asked is not None and asked not in (*there, NO_COLUMN):
+        raise FileFormatError(f"{where} has no array {asked}; it holds {sorted(arrays)}: name one")
+    timed = asked is not None and bool(times)
+    own = {} if timed else declared_rate(where, said or {}, options.rate)
+    times = times if asked is None else [n for n in there if n == asked]
     others = [] if asked else [n for n in fit if skips_frames(there[n])]
     if not times and others and (own or options.rate is not None):
         own |= {"stamps": there[others[0]], "name": others[0], "unit": FRAME}
@@ -379,7 +377,8 @@ def _judge(
         return "s", (Ambiguity(f"{what}and no other unit fits better", "--time-unit s"),)
     what += f"in {looks} {rate_in(looks)}: it looks like {looks}"
     is_counter = COUNTER.search(name.lower()) is not None
-    if said is None and period == 1 and (is_counter or not says_time(name)):
+    is_time = says_time(name) or name.lower() in SECONDS
+    if said is None and period == 1 and (is_counter or not is_time):
         what = f"{name} counts frames, and nothing says how many a second are"
         what += f" (or it is a time: --time-unit {looks})" * (not is_counter)
         return "s", (Ambiguity(what, "--time-unit frame --rate HZ", guessed=False),)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -18,6 +17,7 @@ import numpy as np
 from prior_reinforce.arm.recordings.beside import columns_beside, twin_vectors
 from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.clock import NO_COLUMN
+from prior_reinforce.arm.recordings.heads import with_heads
 from prior_reinforce.arm.recordings.naming import find_channels, numbered_like, vectors, words
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
@@ -41,7 +41,7 @@ from prior_reinforce.arm.recordings.table_times import (
     time_columns,
     with_whole_dates,
 )
-from prior_reinforce.arm.recordings.tables import Table, is_unnamed, is_value, read_table
+from prior_reinforce.arm.recordings.tables import Table, is_unnamed, read_table
 from prior_reinforce.arm.recordings.units import Ambiguity, say_names
 from prior_reinforce.errors import FileFormatError
 
@@ -63,11 +63,6 @@ class LogFormat(NamedTuple):
     time_unit: str
 
 
-_MERGED = 0.2
-"""Share of rows without a value of any joint from which these are of another log. Ours: what a
-recorder lost is less, and is not left out."""
-_ECHOED = ("name", "position", "velocity", "effort")
-"""Arrays of a sensor_msgs/JointState, in order."""
 LOG_FORMATS = (
     # libfranka, src/log.cpp: logToCSV writes time.toMSec(). First 0.9.2 and later, then of 2017.
     LogFormat("libfranka's log", ("time", "success_rate", "state.q[0]"), "state.q", "ms"),
@@ -85,7 +80,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             yield path.stem, unread
             continue
         table = headed(read_table(path, options.delimiter, options.decimal), options.joints)
-        table = with_whole_dates(_with_heads_of_echo(_with_one_head(table)))
+        table = with_whole_dates(with_heads(table))
         said = said_above(path)
         if not table.names or len(table) < 2:
             raise FileFormatError(
@@ -171,22 +166,17 @@ def _episode(
     names = [said.get(i, name) for i, name in enumerate(table.names)]
     joints = options.joints if table.named else None
     found = None if joints is None else find_channels(joints, names)
+    table, remark = _without_other_logs(table, found or ())
     times = time_columns(table, options, above, [episode_column, *(found or ())])
     aside = {*times.columns, *times.held, episode_column, *told}
     others = [i for i in range(len(names)) if i not in aside]
     channels, named = list(others), table.named
     _refuse_text(table, joints or (), names, found or ())
-    blank = [not any(table.cells[i][row] for i in found or ()) for row in range(len(table))]
-    if found and _MERGED <= np.mean(blank) < 1:
-        rows = table.rows([row for row in range(len(table)) if not blank[row]])
-        remark = f"{sum(blank)} rows left out, in which no joint has a value, as of a merged log"
-        said_of_all = (*said_of_all, remark)
-        return _episode(rows, episode, options, episode_column, guessed, above, said_of_all)
     if found and not options.key and {*found} <= {*others}:
         channels = found
     elif table.named and (keys := options.key or ((log.key,) if log else ())):
         channels, named = _by_key(table, keys, others, options.joints or ()), False
-    remarks = [*said_of_all]
+    remarks = [*said_of_all, *remark]
     if log is not None:
         remarks.append(f"{log.name}: time in {log.time_unit}, motion is {log.key} (measured)")
     clock = clock_of_table(table, episode, times, options, above, log and log.time_unit)
@@ -207,7 +197,7 @@ def _episode(
     is_named = named or said.keys() >= {*channels}
     own_names = [said.get(i, name) for i, name in zip(channels, own, strict=True)]
     if not is_named:  # by their places in the file
-        own_names = [] if table.named else [f"column{i + 1}" for i in channels]
+        own_names = [] if table.named else [table.names[i].replace(" ", "") for i in channels]
     unnamed = [i for i in counts if is_unnamed(table.names[i])]
     rest = [i for i in others if i not in channels and i not in unnamed]
     return recorded(
@@ -229,38 +219,21 @@ def _episode(
     )
 
 
-def _with_one_head(table: Table) -> Table:
-    """Join further lines of names, as pandas writes of columns of several levels: `elbow/position`.
+def _without_other_logs(table: Table, found: Sequence[int]) -> tuple[Table, tuple[str, ...]]:
+    """Leave out rows of another log that was merged with that of the joints, and say so.
 
-    Such lines hold no number, date or `nan`, and the line after them does hold a number.
+    They hold values in columns that are mostly empty in rows of the joints, and none of a joint: a
+    row in which a recorder lost the joints alone is no such row.
     """
-    are_numbers = ~np.isnan(table.values)
-    rows = int(np.argmax(are_numbers.any(axis=1))) if table.named and are_numbers.size else 0
-    if rows == 0:
-        return table
-    levels = [[name, *own[:rows]] for name, own in zip(table.names, table.cells, strict=True)]
-    if any(is_value(cell) for level in levels for cell in level[1:]):
-        return table
-    names = tuple("/".join(filter(None, level)) for level in levels)
-    return replace(table.rows(range(rows, len(table))), names=names)
-
-
-def _with_heads_of_echo(table: Table) -> Table:
-    """Give heads to what `ros2 topic echo --csv` writes of a JointState; return others as they are.
-
-    A row is the stamp in s and ns, the frame's name, the joints' names, and as many positions;
-    then velocities and efforts, if there are any.
-    """
-    texts = [i for i in range(len(table.names)) if table.is_text(i)]
-    if table.named or not texts or not all(map(table.is_number, (0, 1))):
-        return table
-    joints = texts[table.names[texts[0]] == "column 3" :]  # an empty name is no column
-    groups, rest = divmod(len(table.names) - 1 - texts[-1], max(len(joints), 1))
-    if texts != [*range(2, texts[-1] + 1)] or rest or not 1 <= groups <= 3:
-        return table
-    heads = [f"{of}{i}" for of in _ECHOED[: 1 + groups] for i in range(len(joints))]
-    frame = ["frame_id"] * (len(texts) - len(joints))
-    return replace(table, names=("sec", "nanosec", *frame, *heads), named=True)
+    empty = np.array([[not cell for cell in cells] for cells in table.cells])
+    blank = empty[list(found)].all(axis=0) if found else np.zeros(len(table), dtype=bool)
+    if not blank.any() or blank.all():
+        return table, ()
+    of_others = ~empty[empty[:, ~blank].mean(axis=1) > 0.5]
+    if not of_others[:, blank].any(axis=0).all():
+        return table, ()
+    remark = f"{blank.sum()} rows left out, in which no joint has a value, as of a merged log"
+    return table.rows(np.flatnonzero(~blank).tolist()), (remark,)
 
 
 def _refuse_text(
@@ -275,7 +248,7 @@ def _refuse_text(
                 "frame and a column a joint: pandas' DataFrame.pivot(index=TIME, columns="
                 f"{names[i]!r}, values=POSITION)"
             )
-        is_tool = opens and kinds([names[i]])[0] is Kind.TOOL
+        is_tool = opens and not found and kinds([names[i]])[0] is Kind.TOOL
         if (i in found or is_tool) and table.is_text(i) and any(cells):
             text = next(filter(None, cells))
             raise FileFormatError(

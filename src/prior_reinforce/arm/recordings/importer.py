@@ -246,14 +246,11 @@ class Recordings:
 
     def select(self, wanted: Wanted) -> Selection:
         """Return the channels of the plan, as in `selection.select`, and what is only guessed."""
-        selection = select(
-            self.episodes,
-            self.options.joints,
-            wanted.names,
-            self.options.units,
-            wanted.plan_units,
-            normalised=self.format == "lerobot",
-        )
+        joints, names = self.options.joints, wanted.names
+        if (joints, names) == (None, None) and wanted.robot and not self.episodes[0].named:
+            joints = names = wanted.robot.joint_names  # asked about, since nothing names them
+        units, shares = (self.options.units, wanted.plan_units), self.format == "lerobot"
+        selection = select(self.episodes, joints, names, *units, normalised=shares)
         return replace(selection, ambiguities=self.ambiguities + selection.ambiguities)
 
     def outcomes(
@@ -422,7 +419,7 @@ def read(source: str | os.PathLike[str], options: ReadOptions | None = None) -> 
 def _how_to_save() -> str:
     return (
         "save each episode as CSV (a line of names, a row a frame, the time in a column) or NPZ; "
-        f"what is read is {', '.join(FORMATS)}"
+        f"what is read is {', '.join(FORMATS)} (--format, where a name does not tell)"
     )
 
 

@@ -148,6 +148,9 @@ def _find(name: str, there: Sequence[str], wanted: Sequence[str]) -> int | None:
         if exact in there:
             return there.index(exact)
     names = [_OF_POSITIONS.sub("", split_unit(channel, CHANNEL_UNITS)[0]) for channel in there]
+    plain = [re.sub(r"[./](pos|position)$", "", own, flags=re.IGNORECASE) for own in names]
+    if plain.count(bare) == 1:
+        return plain.index(bare)
     found = [i for i, other in enumerate(names) if is_joint(other, bare) or is_joint(bare, other)]
     # `Wrist_Pitch.pos` is no `Pitch` beside a `Wrist_Pitch`.
     longer = [joint for joint in wanted if len(joint) > len(bare)]

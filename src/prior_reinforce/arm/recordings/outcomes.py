@@ -44,6 +44,11 @@ _WITH_UNIT = re.compile(r"([-+\d.,]+) *([^\d\s.,]+)")
 """A number and its unit in one cell."""
 _SIDED = re.compile(r"(?i)(?<![a-z])(l|r|left|right|links|rechts)(?![a-z])")
 """Words of a side beside a number: `10 L`."""
+_FILE = re.compile(
+    r"(?:.*[/\\])?([^/\\]+)\.(?:csv|tsv|txt|npz|npy|hdf5|h5|bag|mcap|db3|zarr|mp4|avi|jpe?g|png)",
+    re.IGNORECASE,
+)
+"""Path of a recording, or of what was filmed beside it, by which a row may call its episode."""
 _DATED = re.compile(
     r"(19|20)\d\d([-_.]?)[01]\d\2[0-3]\d([T_ .-]?[0-2]\d[-_.:h]?[0-5]\d([-_.:m]?[0-5]\d.*)?)?$"
 )
@@ -192,12 +197,6 @@ def keep_places(
         write_outcome_table(table, rows, *heads, beside=SOURCE if beside else "note")
 
 
-_FILE = re.compile(
-    r"(?:.*[/\\])?([^/\\]+)\.(?:csv|txt|npz|npy|hdf5|h5|bag|mcap|db3|mp4|jpe?g|png)", re.IGNORECASE
-)
-"""Path of a recording, or of what was filmed beside it."""
-
-
 def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
     """Read a table of outcomes, a CSV of any dialect; rows with empty cells are skipped.
 
@@ -246,7 +245,9 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
     cells = table.cells
     rows, sources = list[str](), list[str]()
     places, sds = list[list[float]](), list[float]()
-    for row, name in enumerate(map(from_cell, cells[key])):
+    for row, cell in enumerate(cells[key]):
+        file = _FILE.fullmatch(from_cell(cell))
+        name = file[1] if file else from_cell(cell)
         if name in rows:
             line = table.lines[row]
             raise FileFormatError(f"{path}, line {line}: episode {name} again; drop one of them")
@@ -413,18 +414,12 @@ def outcomes_of(
 
 
 def _matched(episodes: Sequence[str], names: Sequence[str]) -> dict[str, str]:
-    """Name in the table by episode; a number at the end of two names matches none.
-
-    An episode may be called by its file, `throw_0.csv`.
-    """
-    stems = [_FILE.sub(r"\1", name) for name in names]
+    """Name in the table by episode; a number at the end of two names matches none."""
     numbers, there = list(map(digits_at_end, episodes)), list(map(digits_at_end, names))
     picked: dict[str, str] = {}
     for episode, number in zip(episodes, numbers, strict=True):
         if episode in names:
             picked[episode] = episode
-        elif stems.count(episode) == 1:
-            picked[episode] = names[stems.index(episode)]
         elif number and numbers.count(number) == 1 and there.count(number) == 1:
             picked[episode] = names[there.index(number)]
     return picked

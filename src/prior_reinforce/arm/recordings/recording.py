@@ -70,8 +70,8 @@ class Recording:
     positions: Positions
     """Positions in the recorder's units."""
     names: tuple[str, ...] = ()
-    """Names of the D channels as recorded, without units (`x_cm` is `x`); `column1`, `column2`, ...
-    if the file names none, which is what no joint is called."""
+    """Names of the D channels as recorded, without units (`x_cm` is `x`); if the file names none,
+    `column1`, `column2`, ..., so that none is taken for a joint by its name."""
     outcome: Point | None = None
     """Where the object landed, for the rare file that holds it."""
     remarks: tuple[str, ...] = ()
@@ -255,15 +255,17 @@ def natural_order(name: object) -> tuple[tuple[int, str], ...]:
 
 
 def files_at(source: Path, suffixes: tuple[str, ...]) -> list[Path]:
-    """Return a file itself, or a folder's files with one of the suffixes, in natural order.
-
-    Hidden files of a folder are none of its recordings: macOS leaves a `._throw.csv` beside each.
-    """
+    """Return a file itself, or a folder's files with one of the suffixes, in natural order."""
     if not source.is_dir():
         return [source]
-    seen = (path for path in source.iterdir() if path.is_file() and path.name[0] not in ".~")
-    found = [path for path in seen if has_suffix(path, suffixes) and path.stem != "outcomes"]
+    files = [path for path in source.iterdir() if path.is_file() and not is_hidden(path)]
+    found = [path for path in files if has_suffix(path, suffixes) and path.stem != "outcomes"]
     return sorted(found, key=natural_order)
+
+
+def is_hidden(path: Path) -> bool:
+    """Whether a path is none of its folder's recordings: macOS adds a `._a.csv` to `a.csv`."""
+    return path.name.startswith((".", "~"))
 
 
 def has_suffix(path: Path, suffixes: tuple[str, ...]) -> bool:

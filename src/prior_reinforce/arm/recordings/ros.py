@@ -29,6 +29,7 @@ from prior_reinforce.arm.recordings.recording import (
     Positions,
     Recording,
     has_suffix,
+    is_hidden,
     named_damage,
     natural_order,
     recorded,
@@ -159,7 +160,8 @@ def _bags_at(source: Path) -> list[Path]:
     """The bags a path stands for: itself, or those of its folder; empty if there are none."""
     if not source.is_dir() or (source / "metadata.yaml").is_file():
         return [source] if _files_of(source) else []
-    return sorted(filter(_files_of, source.iterdir()), key=natural_order)
+    seen = [path for path in source.iterdir() if not is_hidden(path)]
+    return sorted(filter(_files_of, seen), key=natural_order)
 
 
 def _files_of(bag: Path) -> list[Path]:

@@ -84,7 +84,7 @@ def select(
         assert names is not None
         recordings = [replace(r, names=joints, columns=()) for r in recordings]
         if units is not None and len(units) == len(joints):
-            units = [units[joints.index(name)] for name in names]
+            units = [units[i] for i in find_channels(names, joints) or ()]
         joints = tuple(names)
     unnamed = names is not None and tuple(names) == joints
     names = tuple(names) if names is not None else joints
@@ -143,8 +143,12 @@ def _are_all_columns(
     joints: Sequence[str], recordings: Sequence[Recording], names: Sequence[str] | None
 ) -> bool:
     """Whether the joints name all columns of recordings without names, more than the plan's."""
-    few = names is not None and {*names} < {*joints} and len({*joints}) == len(joints)
-    return few and all(not r.named and len(r.names) == len(joints) for r in recordings)
+    few = names is not None and len(names) < len(joints) == len({*joints})
+    return (
+        few
+        and find_channels(names or (), joints) is not None
+        and all(not r.named and len(r.names) == len(joints) for r in recordings)
+    )
 
 
 def _refuse_places(

@@ -59,6 +59,7 @@ _OF_AN_OFFICE = re.compile(
 """`11/26/2026 1:05:09.3 PM`, `26.11.2026 13:05:09`: as office programs write them."""
 _SPAN = re.compile(r"([+-]?)(?:(\d+) days? \+?)?(\d+):([0-5]\d):([0-5]\d)(?:[.,](\d{1,9})\d*)?")
 _NAN = ("nan", "+nan", "-nan")
+_NONE = ("none", "null", "na", "n/a", "-", "inf", "-inf")
 _DAY = 86_400 * 10**9
 """In [ns]."""
 _SECOND_ROW_OF_UNITS = re.compile(r"[\[(]?[A-Za-zµμ°/^*·0-9.%-]{0,12}[\])]?")
@@ -129,8 +130,10 @@ class Table:
             found = [read(_as_iso(cell)) for cell in self.cells[column]]
             if None not in found:
                 times = np.array([time - found[0] for time in found], dtype=np.int64)  # type: ignore[operator]
-                # A time of day begins anew at midnight.
-                return times + _DAY * np.cumsum(np.diff(times, prepend=0) < -_DAY // 2)
+                if read is _span and all(0 <= time < _DAY for time in found if time is not None):
+                    # A time of day begins anew at midnight.
+                    times += _DAY * np.cumsum(np.diff(times, prepend=0) < -_DAY // 2)
+                return times
         return None
 
     def stamps(self, column: int) -> Column:
@@ -282,8 +285,8 @@ def _span(text: str) -> int | None:
 
 
 def is_value(text: str) -> bool:
-    """Whether a cell is `nan`, a date or a time of day, and so no name."""
-    return _DATE.match(text) is not None or text.lower() in _NAN
+    """Whether a cell is a date, a time of day, or says that there is no number; so no name."""
+    return _DATE.match(text) is not None or text.lower() in (*_NAN, *_NONE)
 
 
 def _is_number(text: str, decimal: str) -> bool:
@@ -313,7 +316,7 @@ def _table(
         names = list(title)
     else:
         named = False
-    if named and len(rows) > 1 and _are_units(rows[0][1], decimal):
+    if named and len(rows) > 1 and are_units(rows[0][1], decimal):
         units, rows = [known_unit(c) for c in rows[0][1]], rows[1:]
     check_names(where, names)
     rows = [(i, row) for i, row in rows if row != names]  # a head that comes again
@@ -367,7 +370,8 @@ def _without_lists(where: str, columns: list[_Column]) -> list[_Column]:
     return parts
 
 
-def _are_units(cells: list[str], decimal: str) -> bool:
+def are_units(cells: list[str], decimal: str) -> bool:
+    """Whether the cells of a row are units of its columns, some of them empty."""
     return (
         any(known_unit(cell) for cell in cells)
         and all(_SECOND_ROW_OF_UNITS.fullmatch(cell) for cell in cells)

@@ -33,15 +33,15 @@ def read_trajectory(path: Path, episode: str, message: Any, options: ReadOptions
     stated = [positions]
     for derivative in ("velocities", "accelerations"):
         rows = [getattr(point, derivative) for point in points]
-        if any(len(row) != len(joints) for row in rows):
+        if any(len(row) != len(joints) for row in rows) or not np.all(np.isfinite(rows)):
             break
         stated.append(np.array(rows, dtype=float))
     remarks = []
     steps = np.diff(times)
-    if len(stated) > 1 and len(steps) and steps.min() > 0 and np.median(steps) > 2 * _PERIOD:
+    if len(stated) > 1 and len(steps) and steps.min() > 0 and np.median(steps) > 2.01 * _PERIOD:
         from scipy.interpolate import BPoly
 
-        frames = math.ceil((times[-1] - times[0]) / _PERIOD) + 1
+        frames = math.ceil((times[-1] - times[0]) / _PERIOD - 1e-6) + 1
         check_numbers(path, episode, (frames, len(joints)))
         curve = BPoly.from_derivatives(times, np.stack(stated, axis=1))
         degree = "cubics through their velocities" if len(stated) == 2 else "quintics"

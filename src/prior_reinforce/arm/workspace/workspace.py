@@ -322,9 +322,13 @@ class Workspace:
 
         self.state.refuse_open_trial("importing demonstrations")
         wanted = self.wanted(preprocessing, append=append)
-        meant = {"joints": wanted.names, **options, **vars(wanted)}
         result = import_demonstrations(
-            source, outcomes=outcomes, outcome_unit=outcome_unit, take_guesses=take_guesses, **meant
+            source,
+            outcomes=outcomes,
+            outcome_unit=outcome_unit,
+            take_guesses=take_guesses,
+            **vars(wanted),
+            **{"joints": wanted.names, **options},
         )
         self.take_in(result, str(source), append=append)
         return result

@@ -97,11 +97,9 @@ def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
             "what is better",
         )
     some = telling(n).tolist()
-    told, of = demonstrations, list[tuple[int, ...]]()
-    if len(some) < n:
-        told, of = demonstrations.only(some), [tuple(some)]
+    told = demonstrations.only(some) if len(some) < n else demonstrations
     decompositions: dict[WarpKind, Decomposition] = {
-        kind: decompose(demonstrations, kind, *of) for kind in _MAX_RELATIVE_ERROR
+        kind: decompose(demonstrations, kind, tuple(some)) for kind in _MAX_RELATIVE_ERROR
     }
     errors = {kind: outcome_error(told, each) for kind, each in decompositions.items()}
     able = [kind for kind in errors if kind == "start" or errors[kind] < _MAX_USEFUL_ERROR]
