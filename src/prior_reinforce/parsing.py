@@ -230,9 +230,8 @@ def as_bare_error(
             f"{said} looks like {mistaken}; give {asked}, or the unit if it is that"
         )
     if slip := form.slip(error, error=True):
-        raise InvalidFeedbackError(
-            f"an error in {slip} (outcome minus goal), or words with their unit"
-        )
+        what = "where it ended" if landed else "outcome minus goal"
+        raise InvalidFeedbackError(f"an error in {slip} ({what}), or words with their unit")
     return error
 
 

@@ -10,6 +10,7 @@ from PIL import Image, ImageDraw
 
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.cli import main
+from prior_reinforce.perception.calibration import TableCalibration
 from prior_reinforce.perception.camera import Camera
 from prior_reinforce.simulation.tasks import make_task
 from tests.arm.workspace.planar import demonstrations, manifest
@@ -414,6 +415,28 @@ def test_a_picture_of_another_size_is_scaled_or_refused(drawn_table, capsys):
         drawn(drawn_table / "photo.png", (1080, 1920))
         assert look(drawn_table, server.base_url) == 2
         assert "1920 x 1080 px" in capsys.readouterr().err
+
+
+def test_a_picture_that_is_upside_down_against_the_calibrations_is_told(drawn_table, capsys, run):
+    exif = Image.Exif()
+    exif[0x0112] = 3
+    Image.open(drawn_table / "photo.png").rotate(180).save(drawn_table / "photo.png", exif=exif)
+    with VisionServer() as server:
+        assert look(drawn_table, server.base_url) == 0
+    assert "EXIF orientation 3, and 1" in capsys.readouterr().err
+
+
+def test_objects_far_beyond_the_calibrated_points_are_told(drawn_table, capsys, run):
+    few = np.array(POINTS)[[0, 2, 3, 5]]
+    few[:, :2] = 0.6 + 0.1 * (few[:, :2] - few[:, :2].mean(axis=0))
+    table = TableCalibration.load(drawn_table / "table.json")
+    few[:, 2:] = table.to_pixels(few[:, :2])
+    points_file(drawn_table / "points.csv", few.tolist())
+    of = ("--picture", drawn_table / "photo.png", "--out", drawn_table / "table.json")
+    assert run("calibrate", drawn_table / "points.csv", *of)[0] == 0
+    with VisionServer() as server:
+        assert look(drawn_table, server.base_url) == 0
+    assert "cm beyond the calibrated points" in capsys.readouterr().err
 
 
 def test_points_that_were_clicked_in_a_picture_as_it_is_stored_are_told(tmp_path, run):

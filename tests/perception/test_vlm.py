@@ -217,6 +217,21 @@ def wide(table_model, frame_with_ball_at):
     return picture, calibration
 
 
+class SaysTheBall(ColourClient):
+    """Gives the ball's box whatever it is asked for."""
+
+    def ask(self, words, picture):
+        return super().ask(SCENE.reached.words, picture)
+
+
+def test_one_box_for_both_objects_gives_no_number(wide):
+    picture, calibration = wide
+    with VisionLanguageModel(SCENE, client=SaysTheBall("glm-4.5v"), calibration=calibration) as eye:
+        reading = eye.read(picture)
+    assert reading.error_seen is None
+    assert "one box for both" in reading.problem
+
+
 LOOSE = [((1, 1), (1, 1)), ((1.2, 1.2), (1.2, 1.2)), ((0.85, 1.15), (1.1, 0.9))]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -28,6 +28,7 @@ from prior_reinforce.wording import to_words
 
 if TYPE_CHECKING:
     from prior_reinforce.perception.calibration import TableCalibration
+    from prior_reinforce.perception.vlm_reading import Sighting
 
 _COLUMNS = ("x", "y", "u", "v")
 _COARSE = 0.02
@@ -35,6 +36,11 @@ _COARSE = 0.02
 _BESIDE = 5.0
 """From how many times the points' own errors on the points fix no places beside them; ours: it is
 1 to 3 where they stand in the corners of the table, with a wrong one or without."""
+_FAR_BEYOND = 0.25
+"""How far beyond the calibrated points an object is warned of, as a part of how far these are
+apart. Ours: places are extrapolated there."""
+_UPSIDE_DOWN = ({1, 3}, {6, 8})
+"""EXIF orientations half a turn apart, which a telephone that lies flat mixes up."""
 _EXPOSURE = 10
 """Frames, of which the last is kept; ours: the first are dark until a webcam has set itself."""
 _SAME_GOAL, _OTHER_GOAL = 0.02, 0.15
@@ -69,7 +75,7 @@ class Calibrate:
     def run(self) -> None:
         """Fit, save, and say how far each point lies from where the others put it."""
         from prior_reinforce.perception.calibration import TableCalibration, left_out_errors
-        from prior_reinforce.perception.pictures import read_picture
+        from prior_reinforce.perception.pictures import read_picture, stored_turn
 
         refuse_foreign(self.out, "prior-reinforce table calibration")
         for name, height in (("height", self.height), ("outcome-height", self.outcome_height)):
@@ -92,7 +98,8 @@ class Calibrate:
                 raise ConfigurationError("--outcome-height needs --camera X Y Z, in metres")
             _check_camera(calibration, self.outcome_height, self.camera)
             calibration = calibration.at_height(self.outcome_height, np.array(self.camera))
-        calibration.save(self.out)
+        exif = None if self.picture is None else stored_turn(self.picture)
+        replace(calibration, exif=exif).save(self.out)
         print(f"{calibration.summary()}: {self.out}")
         if size is None:
             warn(
@@ -113,7 +120,7 @@ class Calibrate:
             elif 0 < agree.sum() <= np.isfinite(others_off).sum() / 2:
                 remedy = f"; without point {says} the others agree: measure and click it again"
             else:
-                remedy = "; give more points, in all corners of the table"
+                remedy = "; give more points, in all corners; two may be exchanged, as two tags are"
             warn(f"that is coarse{remedy}")
 
 
@@ -152,7 +159,7 @@ class Look:
     def run(self) -> None:
         """Look, keep what was seen beside the photograph, and say what to tell."""
         from prior_reinforce.perception.calibration import TableCalibration
-        from prior_reinforce.perception.pictures import read_picture
+        from prior_reinforce.perception.pictures import read_picture, stored_turn
         from prior_reinforce.perception.vlm import VisionLanguageModel
 
         goal, folder, stem = self._of_trial()
@@ -172,7 +179,13 @@ class Look:
         )
         if self.camera is not None:
             _photograph(self.camera, self.picture)
-        picture = read_picture(self.picture)
+        picture, turn = read_picture(self.picture), stored_turn(self.picture)
+        if {calibration.exif, turn} in _UPSIDE_DOWN:
+            warn(
+                f"{self.picture} says that it is upside down against the calibration's photograph "
+                f"(EXIF orientation {turn}, and {calibration.exif}); if the camera hangs as it did "
+                "then, both errors' signs are wrong: save both as PNG, and calibrate again"
+            )
         here = calibration.in_picture((picture.shape[1], picture.shape[0]))
         if here is not calibration:
             warn("the picture has another size than that of the calibration, and is scaled to it")
@@ -190,6 +203,14 @@ class Look:
             failed.changed = True  # what was seen is kept
             raise failed
         error = reading.error_seen
+        for sighting in (reading.reached, reading.goal):
+            beyond, across = (0.0, 0.0) if sighting is None else _beyond(here, sighting)
+            if sighting is not None and beyond > _FAR_BEYOND * across:
+                warn(
+                    f"{sighting.words} is seen {100 * beyond:.0f} cm beyond the calibrated "
+                    f"points, which are {100 * across:.0f} cm apart: there nothing tells how far "
+                    "off its place is; calibrate with points all around"
+                )
         if goal is not None and reading.reached.place is not None:
             error = reading.reached.place - goal
             moved = float(np.linalg.norm(error - reading.error_seen))
@@ -227,6 +248,18 @@ class Look:
                 )
             goal = state.goal_of(state.trial(self.trial)).goal
         return goal, folder / "pictures", f"trial-{self.trial:03d}-seen"
+
+
+def _beyond(calibration: TableCalibration, sighting: Sighting) -> tuple[float, float]:
+    """How far an object lies outside the box around the clicked points, and its diagonal, [m]."""
+    if calibration.clicked is None or sighting.box is None:
+        return 0.0, 0.0
+    left, top, right, bottom = calibration.clicked
+    u, v = (sighting.box[0] + sighting.box[2]) / 2, (sighting.box[1] + sighting.box[3]) / 2
+    nearest = np.array([np.clip(u, left, right), np.clip(v, top, bottom)])
+    place, edge = calibration.to_table(np.array([u, v])), calibration.to_table(nearest)
+    ends = calibration.to_table(np.array([[left, top], [right, bottom]]))
+    return float(np.linalg.norm(place - edge)), float(np.linalg.norm(ends[1] - ends[0]))
 
 
 def _check_turn(picture: Path, pixels: Float[np.ndarray, "n 2"], size: tuple[int, int]) -> None:

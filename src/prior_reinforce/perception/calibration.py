@@ -41,6 +41,7 @@ class _Saved(msgspec.Struct):
     left_out_error_m: float | None
     worst_sd_m: float = 0.0
     clicked_px: tuple[float, float, float, float] | None = None
+    exif_orientation: int | None = None
 
 
 # Singular values of the design matrix below this share of the largest count as zero: points on
@@ -93,6 +94,8 @@ class TableCalibration:
     that is as wide as they are, as far as the picture shows it. Zero where nobody said."""
     clicked: tuple[float, float, float, float] | None = None
     """Box around the points' pixels: left, top, right, bottom; None where nobody said."""
+    exif: int | None = None
+    """EXIF orientation of the photograph, which a camera that stays keeps; None if none was."""
 
     @property
     def sd(self) -> float:
@@ -278,6 +281,7 @@ class TableCalibration:
             "left_out_error_m": self.left_out_error,
             "worst_sd_m": self.worst_sd,
             "clicked_px": self.clicked,
+            "exif_orientation": self.exif,
         }
         files.write(Path(path), json.dumps(saved, indent=2) + "\n")
 
@@ -303,6 +307,7 @@ class TableCalibration:
             saved.picture_px,
             saved.worst_sd_m,
             saved.clicked_px,
+            saved.exif_orientation,
         )
 
 

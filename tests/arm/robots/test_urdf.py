@@ -327,3 +327,14 @@ def test_bases_are_links_by_which_the_first_axis_passes(tmp_path):
     path.write_text(Urdf("mounted", joints, root="world").text())
     assert bases_on_axis(path, None, None, {}, 0.001) == ("world", ["base"])
     assert bases_on_axis(path, None, "base", {}, 0.001) == ("base", [])
+
+
+def test_a_slide_between_an_arms_own_joints_offers_no_base_behind_them(tmp_path):
+    """A SCARA: what turns behind the quill is not the arm."""
+    path = write_urdf(tmp_path / "a.urdf", ur5e())
+    text = path.read_text()
+    at = text.index('name="wrist_1_joint"')
+    path.write_text(text[:at] + text[at:].replace('type="revolute"', 'type="prismatic"', 1))
+    with pytest.raises(FileFormatError, match="say --tip") as refused:
+        read_urdf(path)
+    assert "--base" not in str(refused.value)

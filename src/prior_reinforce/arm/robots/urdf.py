@@ -233,12 +233,10 @@ def _refuse_other(
     other = [j for j in chain if j.type in TYPES[3:] and j.name not in hold]
     if other:
         first, last = chain.index(other[0]), chain.index(other[-1])
-        says = [f"--base {other[-1].child} for what is behind it"] * any(
-            j in turning for j in chain[last:]
-        )
-        says += [f"--tip {other[0].parent} for what is before"] * any(
-            j in turning for j in chain[:first]
-        )
+        before, behind = (any(j in turning for j in part) for part in (chain[:first], chain[last:]))
+        says = [f"--tip {other[0].parent} for what is before"] * before
+        # What carries the arm may stand still; an arm's own joints do not.
+        says += [f"--base {other[-1].child} for what is behind it"] * (behind and not before)
         holds = "--hold " + " ".join(f"{joint.name}=0" for joint in other)
         raise FileFormatError(
             f"{other[-1].name} is {other[-1].type}, and arms of turning joints are known only; say "
