@@ -9,7 +9,12 @@ from prior_reinforce.arm.recordings import import_demonstrations, read_recording
 from prior_reinforce.arm.recordings.beside import moving_beside
 from prior_reinforce.arm.recordings.selection import select
 from prior_reinforce.arm.robots.plan_files import write_plan
-from prior_reinforce.errors import FileFormatError, PriorReinforceError, UnclearUnitsError
+from prior_reinforce.errors import (
+    FileFormatError,
+    InvalidDemonstrationsError,
+    PriorReinforceError,
+    UnclearUnitsError,
+)
 from prior_reinforce.plans.motions import Plan
 from tests.arm.recordings.recorded import (
     AS_IS,
@@ -265,3 +270,12 @@ def test_three_numbers_that_may_be_joints_are_no_place(tmp_path, keys, names):
     np.savez(tmp_path / "a.npz", t=t, **arrays)
     (read,) = read_recordings(tmp_path / "a.npz", key=keys)
     assert read.names == tuple(names.split())
+
+
+def test_a_gripper_in_another_array_is_named_with_the_option_that_takes_it(tmp_path):
+    t, q = sampled(0, 50)
+    np.savez(tmp_path / "a.npz", t=t, q=q[:, :2], joint_names=["pan", "lift"], gripper=q[:, 3])
+    with pytest.raises(InvalidDemonstrationsError, match=r"gripper stands beside .* another --key"):
+        import_demonstrations(
+            tmp_path, outcomes={"a": [1.0, 0.0]}, joints=["pan", "lift", "gripper"]
+        )

@@ -1,5 +1,7 @@
 """The times of a table's rows, whatever they are called, or what is missing of them."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -232,3 +234,26 @@ def test_a_date_and_a_time_of_day_are_one_time_over_midnight(tmp_path, days):
     (read,) = read_recordings(tmp_path / "log.csv")
     np.testing.assert_allclose(read.times, t, atol=1e-6)
     assert read.names == JOINTS
+
+
+def test_dates_of_a_log_of_changes_are_the_times(tmp_path):
+    stamps = ["09:00:20.000", "09:00:20.460", "09:00:20.490", "09:00:20.510", "09:00:20.900"]
+    rows = [f"2024-05-21 {stamp};{k};{-k}" for k, stamp in enumerate(stamps)]
+    (tmp_path / "a.csv").write_text("\n".join(["SourceTimestamp;pan;lift", *rows]))
+    (read,) = read_recordings(tmp_path / "a.csv")
+    np.testing.assert_allclose(read.times, [0, 0.46, 0.49, 0.51, 0.9])
+
+
+def test_times_of_each_channel_that_differ_are_refused(tmp_path):
+    for late, says in ((0, None), (100, "two columns Time that differ, 0 and 100 first")):
+        rows = [f"{4 * k},{k},{4 * k + late},{-k}" for k in range(9)]
+        (tmp_path / "a.csv").write_text("\n".join(["Time,pan,Time,lift", *rows]))
+        with pytest.raises(FileFormatError, match=says) if says else nullcontext():
+            read_recordings(tmp_path / "a.csv", joints=["pan", "lift"], time_unit="ms")
+
+
+def test_thousands_in_a_column_of_times_are_told_as_such(tmp_path):
+    rows = [f"{t};{k},5" for k, t in enumerate(["980", "990", "1.000", "1.010", "1020"] * 2)]
+    (tmp_path / "a.csv").write_text("\n".join(["Zeit [ms];pan", *rows]))
+    with pytest.raises(FileFormatError, match=r"'1\.000', expected a time; if that is"):
+        read_recordings(tmp_path / "a.csv")

@@ -8,7 +8,7 @@ import pytest
 from prior_reinforce.arm.recordings.selection import select
 from prior_reinforce.arm.recordings.takes import doubts_of_times
 from prior_reinforce.arm.recordings.units import Ambiguity
-from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from tests.arm.recordings.recorded import takes
 
 ARM = ("shoulder", "elbow", "wrist")
@@ -77,3 +77,11 @@ def replace_clock(take, doubtful):
     """The take, with times that may be in [ms]."""
     doubts = (Ambiguity("would take 1000 s", "--time-unit ms"),) * doubtful
     return replace(take, ambiguities=doubts)
+
+
+def test_a_word_that_is_no_unit_is_what_somebody_says_it_is():
+    """Grad, which is a degree in German and a gradian elsewhere."""
+    told = takes(("pan",), [30.0], units=[("Grad",)])
+    assert select(told, units=["deg"]).recorded_units == ("deg",)
+    with pytest.raises(ConfigurationError, match="is in deg, but --units says rad"):
+        select(takes(("pan",), [30.0], units=[("deg",)]), units=["rad"])

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from prior_reinforce.arm.recordings.units import (
@@ -18,6 +19,7 @@ from prior_reinforce.arm.recordings.units import (
     stated_unit,
 )
 from prior_reinforce.errors import ConfigurationError, UnclearUnitsError
+from prior_reinforce.units import base_of
 
 
 @pytest.mark.parametrize(
@@ -124,3 +126,10 @@ def test_what_no_arm_can_do_whoever_says_it(unit, reach, cannot):
 def test_a_motors_hundredths_of_a_degree_are_converted():
     assert stated_unit("pan [0.01 deg]") == ("pan", "0.01 deg")
     assert conversion("0.01 deg", "rad", "pan") == pytest.approx(math.pi / 18000)
+
+
+def test_a_unit_behind_a_number_in_any_brackets_is_one():
+    for head in ("j(0.001deg)", "j [0.001 deg]"):
+        name, unit = split_unit(head, CHANNEL_UNITS)
+        assert (name, base_of(unit)[1]) == ("j", pytest.approx(np.pi / 180_000))
+    assert split_unit("j(2)", CHANNEL_UNITS) == ("j(2)", None)

@@ -147,7 +147,8 @@ class Recording:
             frame = int(np.argmax(np.diff(times) <= 0)) + 1
             raise InvalidDemonstrationsError(
                 f"{episode}: time does not increase at frame {frame} ({times[frame - 1]:g} s, then "
-                f"{times[frame]:g} s); sort or drop those frames"
+                f"{times[frame]:g} s); sort frames that are out of order; if "
+                "the clock was set back, leave that episode out"
             )
         times -= times[0]
         times.setflags(write=False)

@@ -101,7 +101,7 @@ def select(
         )
     joints, guessed = _guess_names(recordings[0], joints) if unnamed else (joints, ())
     _refuse_places(joints, names, plan_units)
-    columns = [_columns(recording, joints, names) for recording in recordings]
+    columns = [_columns(recording, joints, names, plan_units) for recording in recordings]
     if given == "each" and not recordings[0].named:
         stated = [stated[i] for i in find_channels(names, joints) or range(len(joints))]
     if UNIT in (units or ()):
@@ -187,7 +187,12 @@ def _guess_names(
     return found, (Ambiguity(what, f"--joints {shlex.join(found)}"),)
 
 
-def _columns(recording: Recording, joints: tuple[str, ...], names: tuple[str, ...]) -> list[int]:
+def _columns(
+    recording: Recording,
+    joints: tuple[str, ...],
+    names: tuple[str, ...],
+    plan_units: Sequence[str] | None,
+) -> list[int]:
     found = find_channels(joints, recording.names)
     if found is not None:
         return found
@@ -199,12 +204,17 @@ def _columns(recording: Recording, joints: tuple[str, ...], names: tuple[str, ..
         by_key = f", or numbered columns at once: --key {stem}" * bool(stem)
         of_kind = kinds(recording.names)
         others = [kind for kind in of_kind if not kind.is_pose]
-        if Kind.PLACE in of_kind and len(others) < len(joints) and not fitting:
+        are_joints = all(unit in TURN for unit in plan_units or TURN)
+        if Kind.PLACE in of_kind and len(others) < len(joints) and not fitting and are_joints:
             raise InvalidDemonstrationsError(
                 f"episode {recording.episode} has no joint {missing}; it has {there}, a place and "
                 "no joints: name what holds the joints with --key, or import the place into a "
                 "workspace of --robot none"
             )
+        beside = list(recording.beside)
+        for joint in missing_channels(joints, recording.names):
+            for place in find_channels((joint,), beside) or ():
+                by_key += f"; {beside[place]} stands beside the motion: take it by another --key"
         raise InvalidDemonstrationsError(
             f"episode {recording.episode} has no joint {missing}; it has {there}: give the "
             f"recorded names in the plan's order with --joints{by_key}"

@@ -6,7 +6,7 @@ import re
 import shlex
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import islice
+from itertools import combinations, islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -121,6 +121,10 @@ def named_column(table: Table, name: str, option: str) -> int:
     )
 
 
+_THOUSAND = re.compile(r"\d{1,3}([.,]\d{3})+")
+"""`1.000` beside a decimal comma."""
+
+
 class TimeColumns(NamedTuple):
     """Which columns are the time."""
 
@@ -150,6 +154,8 @@ def time_columns(
     skipping = [i for i in free if skips_frames(table.values[:, i])]
     called = [i for i in called if i in free]
     called += [i for i in free if table.named and tells_time(table.names[i], table.stamps(i))]
+    called += [i for i in free if i not in called and _are_dates(table, i)]
+    _refuse_several(table, called)
     if called:
         held = [i for i in free if says_time(table.names[i])]
         held = [i for i in held if np.all(np.diff(table.values[:, i]) > 0)]
@@ -172,6 +178,24 @@ def time_columns(
         what = f"{table.where} names no column of times, and {column} looks like the time"
         return TimeColumns((first,), (Ambiguity(what, f"--time-column {shlex.quote(shown)}"),))
     return TimeColumns()
+
+
+def _are_dates(table: Table, column: int) -> bool:
+    """Whether a column called a time holds dates that rise, though unevenly: a log of changes."""
+    dates = table.nanoseconds(column) if says_time(table.names[column]) else None
+    return dates is not None and bool(np.all(np.diff(dates) > 0))
+
+
+def _refuse_several(table: Table, times: Sequence[int]) -> None:
+    """FileFormatError if columns of one name are times that differ: of each channel its own."""
+    for i, j in combinations(times, 2):
+        one, other = table.stamps(i), table.stamps(j)
+        if table.names[i] == table.names[j] and np.any(one != other):
+            raise FileFormatError(
+                f"{table.where} has two columns {table.names[i]} that differ, {one[0]:g} and "
+                f"{other[0]:g} first: each channel has its own times; write all at the times of "
+                "one: numpy.interp(its times, their own times, their values)"
+            )
 
 
 def _seconds_and_parts(table: Table) -> TimeColumns | None:
@@ -242,7 +266,10 @@ def _check_times(table: Table, columns: Sequence[int]) -> None:
         bad = np.isnan(table.values[:, i])
         if table.named and 0 < bad.sum() < len(bad) / 2:
             row = int(np.argmax(bad))
+            remedy = "take that line out"
+            if _THOUSAND.fullmatch(table.cells[i][row]):
+                remedy = "if that is a thousand, write the column without such marks"
             raise FileFormatError(
                 f"{table.where}, line {table.lines[row]}: {table.names[i]} is "
-                f"{table.cells[i][row][:40]!r}, expected a time; take that line out"
+                f"{table.cells[i][row][:40]!r}, expected a time; {remedy}"
             )

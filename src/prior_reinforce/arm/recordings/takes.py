@@ -19,7 +19,7 @@ from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.units import Ambiguity, judge_unit, known_unit, say_names
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.plans.whole_turns import TURN
-from prior_reinforce.units import base_of, factor
+from prior_reinforce.units import base_of, factor, spelt, without_number
 
 _APART: Mapping[str, Sequence[float]] = {"rad": (TURN["deg"] / TURN["rad"],), "m": (100.0, 1000.0)}
 """How many times larger numbers get by the next unit: rad to deg, m to cm and mm."""
@@ -54,7 +54,9 @@ def in_one_unit(
         stated.append(said or first)
         for own, of_unit in takes.items():
             by = factor(own, said or str(first))
-            if said not in (None, own):
+            if said is not None and by is None and not spelt(without_number(own)[0]):
+                by = 1.0  # a word that is no unit here, `Grad`, and that somebody explained
+            elif said not in (None, own):
                 raise ConfigurationError(
                     f"{of_unit[0].columns[i]} of episode {of_unit[0].episode} is in {own}, but "
                     f"--units says {said}; correct or drop it"

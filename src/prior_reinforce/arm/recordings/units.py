@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from prior_reinforce.errors import ConfigurationError, UnclearUnitsError
-from prior_reinforce.units import STATED, UNITS, factor, spelt, units_of
+from prior_reinforce.units import STATED, UNITS, factor, spelt, units_of, without_number
 
 SECONDS = units_of("time")
 """Units of time, in [s]."""
@@ -83,8 +83,9 @@ def known_unit(text: str) -> str | None:
 def split_unit(column: str, among: Collection[str] | None = None) -> tuple[str, str | None]:
     """Split a column's name `x_cm`, `q0 [deg]` or `time (ms)` into the name and the unit in it.
 
-    `among` are units that may stand there; None takes all, and in square brackets any word at all:
-    `volume [ml]`. Without such a unit, the whole name and None.
+    `among` are units that may stand there, in brackets also behind a number, `(0.001deg)`; None
+    takes all, and in square brackets any word at all: `volume [ml]`. Without such a unit, the whole
+    name and None.
     """
     for pattern in (_BRACKETS, _ENDING, _BEFORE_NUMBER, _CAMEL):
         match = pattern.fullmatch(column.strip())
@@ -95,6 +96,9 @@ def split_unit(column: str, among: Collection[str] | None = None) -> tuple[str, 
             return match["name"] + match["number"], unit
         if unit in (among or _UNITS):
             return match["name"].strip(), unit
+        of_number, number = without_number(match["unit"])
+        if pattern is _BRACKETS and number != 1 and of_number in (among or _UNITS):
+            return match["name"].strip(), match["unit"]
         if among is None and column.strip().endswith("]"):
             return match["name"].strip(), match["unit"]
     return column, None
