@@ -50,6 +50,7 @@ def test_a_steep_view_tells_the_height_and_one_from_straight_above_does_not():
     assert camera_costs(above, 0.1, np.array([0.85, 0.0, 1.6])) < 0.005
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "points",
     [

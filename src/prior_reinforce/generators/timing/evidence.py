@@ -96,10 +96,12 @@ def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
             f"timing: {_WORDS[usual.timeline.kind]}, as a rule; {n} demonstrations cannot tell "
             "what is better",
         )
-    some = telling(n).tolist()
-    told = demonstrations.only(some) if len(some) < n else demonstrations
+    some = tuple(telling(n).tolist())
+    # All of them are asked for without naming them, as elsewhere, so that the answer is kept once.
+    fewer = (some,) if len(some) < n else ()
+    told = demonstrations.only(some) if fewer else demonstrations
     decompositions: dict[WarpKind, Decomposition] = {
-        kind: decompose(demonstrations, kind, tuple(some)) for kind in _MAX_RELATIVE_ERROR
+        kind: decompose(demonstrations, kind, *fewer) for kind in _MAX_RELATIVE_ERROR
     }
     errors = {kind: outcome_error(told, each) for kind, each in decompositions.items()}
     able = [kind for kind in errors if kind == "start" or errors[kind] < _MAX_USEFUL_ERROR]
