@@ -95,7 +95,7 @@ class TableCalibration:
     clicked: tuple[float, float, float, float] | None = None
     """Box around the points' pixels: left, top, right, bottom; None where nobody said."""
     exif: int | None = None
-    """EXIF orientation of the photograph, which a camera that stays keeps; None if none was."""
+    """EXIF orientation of the photograph in which points were clicked; None without one."""
 
     @property
     def sd(self) -> float:

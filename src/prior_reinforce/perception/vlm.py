@@ -174,8 +174,8 @@ class VisionLanguageModel(Perception):
             return goal
         calibration, (tall, wide) = self._in(picture), picture.shape[:2]
         found = [(reached.box, self.scene.reached.size), (goal.box, self.scene.goal.size)]
-        sizes = self.scene.reached.size, self.scene.goal.size
-        if not _alike(*sizes) and np.allclose(reached.box, goal.box, rtol=0, atol=1):
+        (_, one), (_, other) = found
+        if not _alike(one, other) and np.allclose(reached.box, goal.box, rtol=0, atol=1):
             return replace(goal, place=None, problem="the model gives one box for both objects")
         read = [_misfit(box, calibration, size) for box, size in found]
         swapped = [_misfit(self._swapped(box, wide / tall), calibration, s) for box, s in found]

@@ -82,3 +82,12 @@ def test_other_columns_and_other_robots_are_not_asked(tmp_path):
     folder = written(tmp_path, (0.35, 0.35))
     assert imported(folder, replace(ROBOT, held={})).n == N
     assert imported(folder, replace(ROBOT, held={"torso": 0.2})).n == N
+
+
+def test_a_held_joint_is_known_by_its_whole_name(tmp_path):
+    """Pitch beside Wrist_Pitch."""
+    robot = replace(robot_limits("panda"), held={"Pitch": 0.2, "Wrist_Pitch": 1.0})
+    folder = written(tmp_path, (1.0, 1.0), "Wrist_Pitch")
+    assert imported(folder, robot).n == N
+    with pytest.raises(InvalidDemonstrationsError, match=r"Wrist_Pitch is recorded at 0\.5"):
+        imported(written(folder, (0.5, 0.5), "Wrist_Pitch"), robot)

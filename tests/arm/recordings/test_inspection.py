@@ -197,3 +197,12 @@ def test_noise_alone_accelerates_by_as_much_as_the_spline_through_it():
     knots = join_frames(noise, dt)(np.arange(100, 19_900) * dt, 2)
     assert knots.std() == pytest.approx(6 * sigma / dt**2, rel=0.03)
     assert acceleration_of(np.array([sigma]), dt) == pytest.approx(2.5 * knots.std(), rel=0.03)
+
+
+def test_columns_without_names_are_asked_about_as_the_joints_of_a_robot_that_is_named(tmp_path):
+    """Under names of no joint, the gate would judge none of them."""
+    t, q = sampled(0, 100)
+    np.savez(tmp_path / "a.npz", t=t, q=q)
+    found = inspect_recordings(tmp_path, robot=robot_limits("panda"))
+    assert found.selection.names == robot_limits("panda").joint_names
+    assert [one.option.split()[0] for one in found.ambiguities] == ["--joints"]

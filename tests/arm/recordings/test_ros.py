@@ -315,6 +315,12 @@ def test_a_base_that_drives_is_named_whatever_its_message(tmp_path):
     assert moving_beside([read]) == driven
 
 
+def test_hidden_files_beside_bags_are_none(tmp_path):
+    (tmp_path / "._throw0.mcap").write_bytes(b"\0\5\26\7")
+    write_bag(tmp_path / "throw0", 0, kind="mcap")
+    assert [read.episode for read in read_recordings(tmp_path)] == ["throw0"]
+
+
 def test_a_bag_without_joints_is_told_by_what_it_has(tmp_path):
     store = get_typestore(Stores.ROS2_HUMBLE)
     kind = "std_msgs/msg/Float64"

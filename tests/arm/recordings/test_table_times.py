@@ -1,6 +1,7 @@
 """The times of a table's rows, whatever they are called, or what is missing of them."""
 
 from contextlib import nullcontext
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -245,9 +246,10 @@ def test_dates_of_a_log_of_changes_are_the_times(tmp_path):
 
 
 def test_times_of_each_channel_that_differ_are_refused(tmp_path):
-    for late, says in ((0, None), (100, "two columns Time that differ, 0 and 100 first")):
+    late_by = {0: None, 0.001: None, 100: "two columns Time that differ, 0 and 100 first"}
+    for (late, says), head in product(late_by.items(), ("Time", "Time.1")):
         rows = [f"{4 * k},{k},{4 * k + late},{-k}" for k in range(9)]
-        (tmp_path / "a.csv").write_text("\n".join(["Time,pan,Time,lift", *rows]))
+        (tmp_path / "a.csv").write_text("\n".join([f"Time,pan,{head},lift", *rows]))
         with pytest.raises(FileFormatError, match=says) if says else nullcontext():
             read_recordings(tmp_path / "a.csv", joints=["pan", "lift"], time_unit="ms")
 

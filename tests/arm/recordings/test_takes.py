@@ -85,3 +85,10 @@ def test_a_word_that_is_no_unit_is_what_somebody_says_it_is():
     assert select(told, units=["deg"]).recorded_units == ("deg",)
     with pytest.raises(ConfigurationError, match="is in deg, but --units says rad"):
         select(takes(("pan",), [30.0], units=[("deg",)]), units=["rad"])
+
+
+def test_a_unit_that_is_listed_nowhere_is_not_taken_for_another_such_one():
+    with pytest.raises(ConfigurationError, match="is in bar, but --units says psi"):
+        select(takes(("valve",), [3.0], units=[("bar",)]), units=["psi"])
+    (remark,) = select(takes(("pan",), [30.0], units=[("Grad",)]), units=["deg"]).remarks
+    assert "pan is in Grad in t0, taken for deg" in remark

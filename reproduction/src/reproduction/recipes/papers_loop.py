@@ -4,7 +4,8 @@ Outcomes of the demonstrations are read by a camera; each goal is known with an 
 camera's, drawn once; for every trial the network is sampled anew, and the paper's Gaussian process
 corrects the condition from what is seen by eye. Controls: goals known exactly; then one noise for
 all trials, or no adapter. Whether fewer steps or a smaller network would do better is asked on V1.
-The networks want a GPU: six minutes of an H100 for A and B at once, and as long for the others.
+The networks want a GPU: six minutes of an H100 for A and B at once, and eleven of an H200 for fewer
+steps; the smaller one takes three quarters of an hour of a core.
 
 The paper does not say how its plans reach the arm, whose controllers are low-pass filters. Plans of
 the network's raw frames, smoothed ones, and ones of a network that learns spline control points are
@@ -44,7 +45,7 @@ FEWER = {
 }
 """Raw frames at the paper's own size, learned in fewer steps."""
 SMALLER = {"widths 32, 64, 128": FRAMES + ",network.widths=32:64:128"}
-"""Raw frames by a smaller network, which a core of a CPU learns in half an hour."""
+"""Raw frames by a smaller network, which a core of a CPU learns in three quarters of an hour."""
 _OTHERS = FEWER | SMALLER
 _VARIANTS = {"V1": "basketball-v1", "V2": "basketball-v2", "V3": "basketball-v3"}
 LOOP, EXACT = "the paper's loop", "goals known exactly"

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from prior_reinforce.arm.recordings.naming import find_channels
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, say_names, split_unit
-from prior_reinforce.arm.robots.limits import RobotLimits
+from prior_reinforce.arm.robots.limits import RobotLimits, joint_of
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.units import UNITS, factor
 
@@ -26,11 +26,15 @@ def check_held(recordings: Sequence[Recording], robot: RobotLimits | None) -> No
         InvalidDemonstrationsError: One stands elsewhere, or moves: the arm's reach and its box
             would be wrong.
     """
-    for joint, at in robot.held.items() if robot is not None else ():
+    held = {} if robot is None else robot.held
+    joints = list(held)
+    for i, (joint, at) in enumerate(held.items()):
         elsewhere: dict[tuple[float, float], list[str]] = {}
         for recording in recordings:
             for column, (low, high, _) in recording.beside.items():
-                if find_channels([joint], [column]) and not _stands_at(at, column, low, high):
+                name = split_unit(column, CHANNEL_UNITS)[0]
+                own = find_channels([joint], [column]) and joint_of(name, joints) in (None, i)
+                if own and not _stands_at(at, column, low, high):
                     span = float(f"{low:.3g}"), float(f"{high:.3g}")
                     elsewhere.setdefault(span, []).append(recording.episode)
         if elsewhere:

@@ -187,12 +187,17 @@ def _are_dates(table: Table, column: int) -> bool:
 
 
 def _refuse_several(table: Table, times: Sequence[int]) -> None:
-    """FileFormatError if columns of one name are times that differ: of each channel its own."""
+    """FileFormatError if columns of one name are times that differ: of each channel its own.
+
+    pandas numbers columns that come again, `Time.1`. Half a frame is no difference.
+    """
+    bare = [re.sub(r"\.\d+$", "", name) for name in table.names]
     for i, j in combinations(times, 2):
         one, other = table.stamps(i), table.stamps(j)
-        if table.names[i] == table.names[j] and np.any(one != other):
+        apart = np.abs(one - other).max() > np.median(np.abs(np.diff(one))) / 2
+        if bare[i] == bare[j] and apart:
             raise FileFormatError(
-                f"{table.where} has two columns {table.names[i]} that differ, {one[0]:g} and "
+                f"{table.where} has two columns {bare[i]} that differ, {one[0]:g} and "
                 f"{other[0]:g} first: each channel has its own times; write all at the times of "
                 "one: numpy.interp(its times, their own times, their values)"
             )

@@ -54,8 +54,10 @@ def in_one_unit(
         stated.append(said or first)
         for own, of_unit in takes.items():
             by = factor(own, said or str(first))
-            if said is not None and by is None and not spelt(without_number(own)[0]):
-                by = 1.0  # a word that is no unit here, `Grad`, and that somebody explained
+            is_word = by is None and not spelt(without_number(own)[0])
+            if is_word and said is not None and spelt(said):
+                by = 1.0  # `Grad`, which is no listed unit
+                remarks.append(f"{name} is in {own} in {called[own]}, taken for {said}, as said")
             elif said not in (None, own):
                 raise ConfigurationError(
                     f"{of_unit[0].columns[i]} of episode {of_unit[0].episode} is in {own}, but "

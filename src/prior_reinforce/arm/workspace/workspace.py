@@ -322,14 +322,9 @@ class Workspace:
 
         self.state.refuse_open_trial("importing demonstrations")
         wanted = self.wanted(preprocessing, append=append)
-        result = import_demonstrations(
-            source,
-            outcomes=outcomes,
-            outcome_unit=outcome_unit,
-            take_guesses=take_guesses,
-            **vars(wanted),
-            **{"joints": wanted.names, **options},
-        )
+        options = {"joints": wanted.names, "take_guesses": take_guesses, **options}
+        of_outcomes: Any = {"outcomes": outcomes, "outcome_unit": outcome_unit}
+        result = import_demonstrations(source, **of_outcomes, **options, **vars(wanted))
         self.take_in(result, str(source), append=append)
         return result
 
