@@ -5,7 +5,7 @@ camera's, drawn once; for every trial the network is sampled anew, and the paper
 corrects the condition from what is seen by eye. Controls: goals known exactly; then one noise for
 all trials, or no adapter. Whether fewer steps or a smaller network would do better is asked on V1.
 The networks want a GPU: six minutes of an H100 for A and B at once, and eleven of an H200 for fewer
-steps; the smaller one takes three quarters of an hour of a core.
+steps; the smallest takes three quarters of an hour of a core.
 
 The paper does not say how its plans reach the arm, whose controllers are low-pass filters. Plans of
 the network's raw frames, smoothed ones, and ones of a network that learns spline control points are
@@ -44,8 +44,13 @@ FEWER = {
     f"{steps:,} steps": f"diffusion-paper,training_steps={steps}" for steps in (2500, 5000, 10000)
 }
 """Raw frames at the paper's own size, learned in fewer steps."""
-SMALLER = {"widths 32, 64, 128": FRAMES + ",network.widths=32:64:128"}
-"""Raw frames by a smaller network, which a core of a CPU learns in three quarters of an hour."""
+SMALLER = {
+    f"widths {', '.join(map(str, widths))}": f"{FRAMES},network.widths={':'.join(map(str, widths))}"
+    for widths in ((32, 64, 128), (64, 128, 256), (128, 256, 512))
+}
+"""Raw frames by smaller networks, an eighth, a quarter and half as wide."""
+_ON_A_CORE = next(iter(SMALLER))
+"""The smallest, which a core of a CPU learns in three quarters of an hour."""
 _OTHERS = FEWER | SMALLER
 _VARIANTS = {"V1": "basketball-v1", "V2": "basketball-v2", "V3": "basketball-v3"}
 LOOP, EXACT = "the paper's loop", "goals known exactly"
@@ -125,7 +130,7 @@ def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
     forms = {"frames": FRAMES, "splines": SPLINES} | _OTHERS
     planned = list[Planned]()
     for form, generator in forms.items():
-        device = "cpu" if form in SMALLER else scale.device
+        device = "cpu" if form == _ON_A_CORE else scale.device
         for name in scale.sets:
             training = Training(
                 TASK, name, generator, scale.seeds[0], perception="camera", device=device
