@@ -89,7 +89,7 @@ def test_a_row_a_form_and_what_is_known_before_the_gate_in_words():
           for task, at in (("basketball-v1", 2), ("basketball-v2", 4)) for j in range(3)),
         *({**told, "task": "basketball-v1", "method": f"{form}: {of}", "goal": 0, "solved_at": at,
            "failed_readings": 0}
-          for form in FEWER for of, at in ((LOOP, 7), (ONE_NOISE, 5))),
+          for form in (*FEWER, *SMALLER) for of, at in ((LOOP, 7), (ONE_NOISE, 5))),
         *({**told, "task": "basketball-v1", "condition": GATE, "method": "raw", "goal": j,
            "solved_at": 1, "rounds": 1, "passed": j % 2} for j in range(4)),
         *({**told, "task": "basketball-v1", "condition": KNOWN, "method": "raw",
@@ -99,6 +99,7 @@ def test_a_row_a_form_and_what_is_known_before_the_gate_in_words():
     (row,) = RECIPE.table(results).rows
     assert [cell.split()[0] for cell in row[:3]] == ["loop", "2.00", "4.00"]
     known, others, gate = RECIPE.remarks(results)
-    assert others.endswith("10,000 steps 7.00, 5.00.")
+    assert "; 10,000 steps 7.00, 5.00; " in others
+    assert others.endswith("widths 128:256:512 7.00, 5.00.")
     assert known.endswith("raw 2.0.")
     assert gate.endswith("raw 0.50 and 1.00.")

@@ -4,8 +4,9 @@ Outcomes of the demonstrations are read by a camera; each goal is known with an 
 camera's, drawn once; for every trial the network is sampled anew, and the paper's Gaussian process
 corrects the condition from what is seen by eye. Controls: goals known exactly; then one noise for
 all trials, or no adapter. Whether fewer steps or a smaller network would do better is asked on V1.
-The networks want a GPU: six minutes of an H100 for A and B at once, and eleven of an H200 for fewer
-steps; the smallest takes three quarters of an hour of a core.
+The networks want a GPU: six minutes of an H100 for A and B at once, eleven of an H200 for fewer
+steps, fourteen of an H100 for two smaller sizes; the smallest takes three quarters of an hour of a
+core.
 
 The paper does not say how its plans reach the arm, whose controllers are low-pass filters. Plans of
 the network's raw frames, smoothed ones, and ones of a network that learns spline control points are
@@ -45,8 +46,8 @@ FEWER = {
 }
 """Raw frames at the paper's own size, learned in fewer steps."""
 SMALLER = {
-    f"widths {', '.join(map(str, widths))}": f"{FRAMES},network.widths={':'.join(map(str, widths))}"
-    for widths in ((32, 64, 128), (64, 128, 256), (128, 256, 512))
+    f"widths {widths}": f"{FRAMES},network.widths={widths}"
+    for widths in ("32:64:128", "64:128:256", "128:256:512")
 }
 """Raw frames by smaller networks, an eighth, a quarter and half as wide."""
 _ON_A_CORE = next(iter(SMALLER))
@@ -175,7 +176,7 @@ def table(results: Results) -> Table:
         "V1, within 4": mean_of(reached(4), task=on_v1),
     }
     looped = results.having("failed_readings").by("method")
-    shown = {name: rows for name, rows in looped.items() if name.partition(":")[0] not in _OTHERS}
+    shown = {name: rows for name, rows in looped.items() if name.partition(": ")[0] not in _OTHERS}
     return Table.of(("trials to a goal",), shown, columns)
 
 
@@ -186,7 +187,8 @@ def remarks(results: Results) -> list[str]:
         for form, rows in results.where(condition=KNOWN).by("method").items()
     ]
     gate = [
-        f"{plans} {rows.mean(column('passed', SHARE)).value:.2f} and {rows.mean(FIRST).value:.2f}"
+        f"{plans.removeprefix('frames, ')} {rows.mean(column('passed', SHARE)).value:.2f} and "
+        f"{rows.mean(FIRST).value:.2f}"
         for plans, rows in results.where(condition=GATE).by("method").items()
     ]
     on_v1 = results.where(task=_VARIANTS["V1"]).having("failed_readings").by("method")
