@@ -8,7 +8,12 @@ import pytest
 
 from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
 from prior_reinforce.arm.recordings.beside import moving_beside
-from prior_reinforce.errors import FileFormatError
+from prior_reinforce.errors import (
+    ConfigurationError,
+    FileFormatError,
+    InvalidDemonstrationsError,
+    UnclearUnitsError,
+)
 from tests.arm.recordings.recorded import (
     AS_IS,
     JOINTS,
@@ -46,6 +51,38 @@ def test_robomimic_with_frames_missing(tmp_path):
         file["data/demo_2"].attrs["num_samples"] = 99
     with pytest.raises(FileFormatError, match="demo_2 declares 99 samples"):
         read_recordings(path)
+
+
+@pytest.mark.parametrize("shape", [(-1,), (-1, 1), (1, -1)])
+@pytest.mark.parametrize(("name", "guessed"), [("time", False), ("stamps", True)])
+def test_times_count_in_every_shape_and_under_every_name(tmp_path, shape, name, guessed):
+    q = sampled(0, 50)[1]
+    with h5py.File(tmp_path / "0.h5", "w") as file:
+        file["q"], file["cycle"] = q, np.arange(len(q))
+        file[name] = (5 + 0.011 * np.arange(len(q))).reshape(shape)
+    if guessed:
+        with pytest.raises(
+            UnclearUnitsError, match=r"stamps looks like the .*--time-column stamps"
+        ):
+            read_recordings(tmp_path, key="q")
+    (read,) = read_recordings(tmp_path, key="q", time_column="stamps" if guessed else None)
+    assert read.period == pytest.approx(0.011)
+    with pytest.raises(ConfigurationError, match=rf"--rate 100, but {name} in s says 90\.91 Hz"):
+        read_recordings(tmp_path, key="q", rate=100)
+
+
+def test_a_joint_that_rises_steadily_is_no_time(tmp_path):
+    with h5py.File(tmp_path / "0.h5", "w") as file:
+        file["lift"], file["turn"] = np.linspace(0, 1, 99), np.sin(np.arange(99))
+    with pytest.raises(FileFormatError, match="neither times nor a rate"):
+        read_recordings(tmp_path, key=("turn", "lift"))
+
+
+def test_rows_and_columns_that_are_exchanged_are_named_before_a_time_is_missed(tmp_path):
+    with h5py.File(tmp_path / "0.h5", "w") as file:
+        file["q"], file["time"] = sampled(0, 50)[1].T, np.arange(61) / 50
+    with pytest.raises(InvalidDemonstrationsError, match="rows and columns are exchanged"):
+        read_recordings(tmp_path, key="q")
 
 
 @pytest.mark.parametrize("form", ["ALOHA", "ManiSkill"])

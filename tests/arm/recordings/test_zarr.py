@@ -38,12 +38,13 @@ def test_a_replay_buffer_whose_episodes_end_elsewhere(tmp_path):
         read_recordings(path, key="action", rate=50)
 
 
-def test_a_replay_buffers_own_times_are_used(tmp_path):
+@pytest.mark.parametrize("shape", [(-1,), (-1, 1)])
+def test_a_replay_buffers_own_times_are_used(tmp_path, shape):
     """As UMI writes them: seconds of a running clock in `data/timestamp`."""
     path = write_zarr(tmp_path)
     root = zarr.open_group(str(path), mode="r+")
     count = root["data/joint_pos"].shape[0]
-    root["data"].create_array("timestamp", data=7.5 + np.arange(count) / 50)
+    root["data"].create_array("timestamp", data=(7.5 + np.arange(count) / 50).reshape(shape))
     (first, *_) = read_recordings(path, key="joint_pos")
     assert first.clock == "timestamp in s"
     assert first.period == pytest.approx(0.02)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+import shlex
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -53,6 +54,8 @@ _LOWEST_RATE, _HIGHEST_RATE = 1e-3, 1e6
 """Declared frames a second beyond which a file is damaged. Ours."""
 _SLOWEST, _FASTEST = 1.0, 1e4
 """And beyond which a rate or a unit is doubted although the file or a person says it. Ours."""
+FEWEST_COUNTS = 20
+"""Frames of which it can be said that something counts them. Ours."""
 COUNTER = re.compile(
     r"(^|[^a-z])(seq|frame|sample|index|idx|count|counter|tick|row|nr|step)s?($|[^a-z])"
 )
@@ -279,33 +282,41 @@ def clock_among(
     arrays: Mapping[str, np.ndarray],
     options: ReadOptions,
     said: Mapping[str, Any] | None = None,
+    motion: Collection[str] = (),
 ) -> Clock:
     """Return times from the arrays of an episode that say they are, held against each other.
 
     `said` are further numbers of the file, a rate perhaps among them. An array that is asked for by
-    name counts more.
+    name counts more. Where none says it, whatever rises steadily may be the time, but no array of
+    the `motion`: it is asked about, or held against a rate.
     """
     asked = options.time_column
-    there = {name: a.ravel() if a.size == count else a for name, a in arrays.items()}
-    fit = [name for name, array in there.items() if array.shape == (count,)]
-    times = [n for n in there if split_unit(n, SECONDS)[0] in _CALLED]
-    times += [n for n in fit if n not in times and tells_time(n, there[n])]
-    if asked is not None and asked not in (*there, NO_COLUMN):
+    fit = [name for name, array in arrays.items() if array.shape == (count,)]
+    times = [n for n in arrays if split_unit(n, SECONDS)[0] in _CALLED]
+    times += [n for n in fit if n not in times and tells_time(n, arrays[n])]
+    if asked is not None and asked not in (*arrays, NO_COLUMN):
         raise FileFormatError(f"{where} has no array {asked}; it holds {sorted(arrays)}: name one")
     timed = asked is not None and bool(times)
     own = {} if timed else declared_rate(where, said or {}, options.rate)
-    times = times if asked is None else [n for n in there if n == asked]
-    others = [] if asked else [n for n in fit if skips_frames(there[n])]
-    if not times and others and (own or options.rate is not None):
-        own |= {"stamps": there[others[0]], "name": others[0], "unit": FRAME}
+    times = times if asked is None else [n for n in arrays if n == asked]
+    others = [] if asked else [n for n in fit if skips_frames(arrays[n])]
+    rated, guessed = bool(own or options.rate is not None), list[Ambiguity]()
+    if not times and others and rated:
+        own |= {"stamps": arrays[others[0]], "name": others[0], "unit": FRAME}
+    elif not times and not asked and count >= FEWEST_COUNTS:
+        rising = [n for n in fit if n not in motion and rises(arrays[n])]
+        times = [n for n in rising if np.any(np.diff(arrays[n]) != 1)][:1]
+        if times and not rated:
+            what = f"{where} names no times, and {times[0]} looks like the time"
+            guessed.append(Ambiguity(what, f"--time-column {shlex.quote(times[0])}"))
     if not times:
         return options.clock(episode, count, **own)
     first, *others = dict.fromkeys([*times, *others])
-    clock = options.clock(episode, count, stamps=there[first], name=first, **own)
+    clock = options.clock(episode, count, stamps=arrays[first], name=first, **own)
     if count > 1:
-        held = {name: there[name].astype(float) for name in others if name in fit}
+        held = {name: arrays[name].astype(float) for name in others if name in fit}
         hold_together(f"{where}: {episode}", {first: clock.times} | held)
-    return clock
+    return replace(clock, ambiguities=(*clock.ambiguities, *guessed))
 
 
 def hold_together(where: str, clocks: Mapping[str, Times]) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 
 from prior_reinforce.arm.recordings.beside import columns_beside, twin_vectors
 from prior_reinforce.arm.recordings.channels import Kind, kinds
-from prior_reinforce.arm.recordings.clock import NO_COLUMN
+from prior_reinforce.arm.recordings.clock import FEWEST_COUNTS, NO_COLUMN
 from prior_reinforce.arm.recordings.heads import with_heads
 from prior_reinforce.arm.recordings.naming import find_channels, numbered_like, vectors, words
 from prior_reinforce.arm.recordings.options import ReadOptions
@@ -32,7 +32,6 @@ from prior_reinforce.arm.recordings.recording import (
 )
 from prior_reinforce.arm.recordings.stated import headed, names_said
 from prior_reinforce.arm.recordings.table_times import (
-    FEWEST_COUNTS,
     called_times,
     clock_of_table,
     counts_rows,

@@ -72,7 +72,7 @@ def _demo(path: Path, top: Any, within: str, options: ReadOptions, episode: str)
             name: _numbers(path, name, _own(path, group, name))
             for name, own in _shapes(group).items()
             if len(own) <= 2 and (own[0] == count or math.prod(own) <= _MOST_AT_OWN_RATE)
-            if (own[0] == count and len(own) == 1) or may_move(name, math.prod(own[1:]))
+            if math.prod(own) == count or may_move(name, math.prod(own[1:]))
         } | arrays
         texts, stated = _said(path, top, group, key)
         declared = int(stated.get("num_samples", count))

@@ -117,11 +117,8 @@ class Recording:
                 f"{len(names)} channels; expected (T,) and (T, {len(names)}) with T >= 2: mend or "
                 "drop it"
             )
-        if not (self.named and self.names) and width > _WIDER * times.size:
-            raise InvalidDemonstrationsError(
-                f"{episode} has {times.size} frames of {width} numbers each, as a motion has whose "
-                "rows and columns are exchanged: save it with a row a frame"
-            )
+        if not (self.named and self.names):
+            refuse_exchanged(self.episode, positions)
         repeated = [name for name, count in Counter(names).items() if count > 1]
         if repeated:
             raise InvalidDemonstrationsError(
@@ -172,6 +169,16 @@ class Recording:
     def period(self) -> float:
         """Median time between two frames, in [s]."""
         return float(np.median(np.diff(self.times)))
+
+
+def refuse_exchanged(episode: str, positions: Positions) -> None:
+    """Refuse a motion without names whose rows look like columns: InvalidDemonstrationsError."""
+    count, width = positions.shape
+    if width > _WIDER * count:
+        raise InvalidDemonstrationsError(
+            f"episode {episode} has {count} frames of {width} numbers each, as a motion has whose "
+            "rows and columns are exchanged: save it with a row a frame"
+        )
 
 
 def recorded(

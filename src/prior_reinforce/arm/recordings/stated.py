@@ -25,7 +25,13 @@ from prior_reinforce.arm.recordings.clock import (
     says_time,
 )
 from prior_reinforce.arm.recordings.naming import OTHER_NAMES, Texts, missing_channels, said_in
-from prior_reinforce.arm.recordings.recording import Positions, Recording, recorded, without_units
+from prior_reinforce.arm.recordings.recording import (
+    Positions,
+    Recording,
+    recorded,
+    refuse_exchanged,
+    without_units,
+)
 from prior_reinforce.arm.recordings.tables import Table
 from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, Ambiguity, known_unit, say_names
 from prior_reinforce.arm.robots.limits import says_no_position
@@ -65,13 +71,18 @@ def recorded_among(
     """
     count = len(arrays[keys[0]])
     stated = stated or {}
+    # A number a frame is (T,), also where it was written as (T, 1) or (1, T).
+    flat = {n: a.ravel() for n, a in arrays.items() if a.size == count and n not in keys}
+    arrays = {**arrays, **flat}
     kept, why = frames_said(f"{where}: {episode}", keys[0], {**stated, **arrays}, count)
     arrays = {n: a[:kept] if a.shape[:1] == (count,) else a for n, a in arrays.items()}
     positions, known = joined(where, keys, arrays, texts, options.joints)
     bare, units = without_units(names or known)
+    if not bare:
+        refuse_exchanged(episode, positions)
     said = units_said(texts, bare or ("",) * positions.shape[1])
     units = tuple(a or b for a, b in zip(said, units or (None,) * len(said), strict=False))
-    clock = clock or clock_among(where, episode, kept, arrays, options, stated)
+    clock = clock or clock_among(where, episode, kept, arrays, options, stated, keys)
     others = {name: array for name, array in arrays.items() if name not in keys}
     called = (*keys, *(names or known))
     more["beside"] = arrays_beside(positions, others, clock.times, called)

@@ -14,6 +14,7 @@ import numpy as np
 
 from prior_reinforce.arm.recordings.beside import is_clock
 from prior_reinforce.arm.recordings.clock import (
+    FEWEST_COUNTS,
     FRAME,
     NO_COLUMN,
     SAME_RATE,
@@ -43,8 +44,6 @@ _TIMES = (
     "datetime", "date", "zeit", "uhrzeit", "hora", "heure", "ora",
 )  # fmt: skip
 _DATES = ("date", "datum", "day", "fecha", "data")
-FEWEST_COUNTS = 20
-"""Rows of which it can be said that a column counts them. Ours."""
 _MOST_COMMENTS = 200
 """Lines above a table that are looked through. Ours."""
 _SAYS = re.compile(

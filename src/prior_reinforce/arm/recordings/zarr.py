@@ -81,7 +81,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             name: _numbers(source, group, arrays, f"data/{name}")
             for name, (frames, *width) in shapes.items()
             if name in keys
-            or (frames == count and not width)
+            or (frames == count and math.prod(width) == 1)
             or (len(width) < 2 and frames * math.prod(width) <= most and may_move(name, *width))
         }
         nodes = (group[f"data/{keys[0]}"], group["data"], group)
