@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from itertools import product
 from pathlib import Path
 from typing import Literal
@@ -48,7 +48,15 @@ _OUTSIDE = (0.1, 0.2)
 """How far outside the region goals are tried, [m]."""
 SHOWN = {"basketball-v1": 6, "curling": 6, "fishing": 8}
 """Demonstrations in a set; of the zoo's, eight."""
-ZOO = tuple(name for name in (*DEVELOPED_ON, *REPORTED) if make_task(name).symmetry is not None)
+
+
+@cache
+def _symmetry(task: str) -> Symmetry | None:
+    """The task's, whose scene is compiled once for all units."""
+    return make_task(task).symmetry
+
+
+ZOO = tuple(name for name in (*DEVELOPED_ON, *REPORTED) if _symmetry(name) is not None)
 """Tasks of the zoo that state a symmetry."""
 _OF_ZOO = "mixed-8-{}"
 """Sets of the zoo, people of every kind: the number is that of the set that it stands beside."""
@@ -75,7 +83,7 @@ class Shown(Training):
     def _prior(self, folder: Path) -> Demonstrations:
         whole = Training._prior(replace(self, subset=None), folder)
         chosen = range(whole.n) if self.subset is None else self.subset
-        own = make_task(self.task).symmetry
+        own = _symmetry(self.task)
         if self.symmetry == "none" or own is None:
             return whole.only(tuple(chosen))
         about = own
@@ -188,7 +196,7 @@ def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
 
 def _subsets(method: Method, task: str, name: str, count: int) -> int:
     """How many subsets of a set are tried: of the shipped ones perhaps each demonstration alone."""
-    symmetry = make_task(task).symmetry
+    symmetry = _symmetry(task)
     if count == 1 and symmetry is not None and np.any(symmetry.learned):
         return 0  # which one demonstration does not tell
     alone = method.thorough and count == 1 and name not in DRAWN
