@@ -102,4 +102,4 @@ def test_a_row_a_form_and_what_is_known_before_the_gate_in_words():
     assert "; 10,000 steps 7.00, 5.00; " in others
     assert others.endswith("widths 128:256:512 7.00, 5.00.")
     assert known.endswith("raw 2.0.")
-    assert gate.endswith("raw 0.50 and 1.00.")
+    assert gate.endswith("raw 0.50, 1.00.")

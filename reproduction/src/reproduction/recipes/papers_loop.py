@@ -187,7 +187,7 @@ def remarks(results: Results) -> list[str]:
         for form, rows in results.where(condition=KNOWN).by("method").items()
     ]
     gate = [
-        f"{plans.removeprefix('frames, ')} {rows.mean(column('passed', SHARE)).value:.2f} and "
+        f"{plans.removeprefix('frames, ')} {rows.mean(column('passed', SHARE)).value:.2f}, "
         f"{rows.mean(FIRST).value:.2f}"
         for plans, rows in results.where(condition=GATE).by("method").items()
     ]
@@ -201,7 +201,7 @@ def remarks(results: Results) -> list[str]:
     if others:
         said.append(f"Trials on V1, the paper's loop and one noise: {'; '.join(others)}.")
     if gate:
-        said.append(f"Plans that the Panda's gate lets pass, and hits: {'; '.join(gate)}.")
+        said.append(f"Plans that pass the Panda's gate, and hits: {'; '.join(gate)}.")
     return said
 
 
