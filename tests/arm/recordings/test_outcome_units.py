@@ -201,3 +201,51 @@ def test_lengths_in_two_units_have_to_be_said_each(recording, tmp_path, scale):
     path = table(tmp_path, "\n".join([head, *rows_of_outcomes(scale)]))
     seen = import_demonstrations(recording, outcomes=path).demonstrations.outcomes_seen
     np.testing.assert_allclose(seen, list(OUTCOMES.values()))
+
+
+def judged(tmp_path, head, rows, unit=None):
+    """The outcomes in metres of a table of rows numbered from 0."""
+    lines = [f"{i},{row}" for i, row in enumerate(rows.split())]
+    path = table(tmp_path, "\n".join([f"episode,{head}", *lines]))
+    wanted = ["m"] * (head.count(",") + 1)
+    return in_units(read_outcomes(path), wanted, unit)[0].values
+
+
+@pytest.mark.parametrize(
+    ("head", "rows", "unit"),
+    [
+        ("x_cm,y_cm", "80,5 86,-7 0.92,0.02 98,-11", None),
+        ("x_cm,y_cm", "80,5 86,-7 1.05,0.02 98,-11", None),
+        ("x_mm,y_mm", "800,50 860,-70 92,2 980,-110", None),
+        ("x [in],y [in]", "31,2 34,-3 0.92,0.02 39,-4", None),
+        ("x,y", "80,5 86,-7 0.92,0.02 98,-11", "cm"),
+        ("x,y", "80,5 86,-7 0.92,0.02 98,-11", None),
+        ("x_cm", "80 86 0.92 98", None),
+        ("x_m,y_m", "0.8,0.05 0.86,-0.07 92,2 0.98,-0.11", None),
+        ("x_m,y_m", "0.03,0.01 0.02,-0.01 2.5,0.4 0.04,0", None),
+    ],
+)
+def test_a_row_that_is_as_the_others_in_another_unit_is_named(tmp_path, head, rows, unit):
+    with pytest.raises(InvalidDemonstrationsError, match="2 is in another unit"):
+        judged(tmp_path, head, rows, unit)
+
+
+@pytest.mark.parametrize(
+    ("head", "rows", "unit"),
+    [
+        ("x_cm,y_cm", "80,5 -86,7 0.1,0.2 3,98", None),
+        ("x_cm,y_cm", "80,5 -86,7 9,2 3,98", None),
+        ("x_cm,y_cm", "80,5 -86,7 0,0 3,98", None),
+        ("x,y", "0.8,0.05 -0.86,0.07 0.01,0.01 0.03,0.98", None),
+        ("x_cm,y_cm", "80,5 0.92,0.02 98,-11", None),
+        ("x_cm,y_cm", "80,5 86,-7 0.92,0.02 98,-11", "m"),
+        ("y_cm", "-11 -7 2 5 0.05", None),
+    ],
+)
+def test_a_row_near_the_base_is_in_no_other_unit(tmp_path, head, rows, unit):
+    assert len(judged(tmp_path, head, rows, unit)) == len(rows.split())
+
+
+def test_angles_and_times_may_be_small(tmp_path):
+    path = table(tmp_path, "episode,a_deg,t_ms\n0,40,800\n1,50,900\n2,0.8,0.9\n3,55,950\n")
+    assert len(in_units(read_outcomes(path), ["rad", "s"], None)[0].values) == 4

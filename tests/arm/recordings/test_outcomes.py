@@ -1,12 +1,14 @@
 """Outcomes beside a recording: matched, converted, and every one that is missing is named."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from prior_reinforce.arm.recordings import import_demonstrations
 from prior_reinforce.arm.recordings.outcomes import (
+    Outcomes,
     check_rows,
-    digits_at_end,
     keep_places,
     missing_outcomes,
     places_of,
@@ -322,13 +324,6 @@ def test_ways_home_beside_the_throws_are_left_out_by_name(tmp_path):
     np.testing.assert_allclose(seen.outcomes_seen, list(OUTCOMES.values()))
 
 
-def test_the_seconds_of_a_time_are_no_number_of_an_episode():
-    assert digits_at_end("2024-05-03_14-02-03") == digits_at_end("20240503T140203") == ""
-    assert digits_at_end("demo_003") == digits_at_end("set-2_3") == "3"
-    assert digits_at_end("2024-05-03") == digits_at_end("log_2024-05-03_1402") == ""
-    assert digits_at_end("2024-05-03_demo_003") == digits_at_end("2024-05-03_3") == "3"
-
-
 def test_a_distance_and_a_bearing_are_said_to_be_no_x_and_y(recording, tmp_path):
     path = table(tmp_path, "episode,r,angle\n0,0.9,7\n")
     with pytest.raises(InvalidDemonstrationsError, match="x = r cos b"):
@@ -396,3 +391,26 @@ def test_rows_may_be_called_by_the_files_of_the_recordings(tmp_path):
     rows = read_outcomes(tmp_path / "o.csv")
     assert rows.episodes == ("throw_1", "Throw_b", "c.csvx")
     assert missing_outcomes(["demo_001", "Throw_b", "demo_4"], rows) == ["demo_4"]
+
+
+def paired(there, rows, column="episode", chosen=None):
+    """Row of each episode, of a table of rows by that column."""
+    names, places = chosen or there, [[float(i)] for i in range(len(rows))]
+    found = Outcomes.of_numbers("t.csv", dict(zip(rows, places, strict=True)))
+    found = check_rows(replace(found, word=column), names, there, others=True)
+    return [rows[int(place[0])] for place in places_of(names, found).values()]
+
+
+def test_rows_give_the_number_behind_their_columns_name(tmp_path):
+    path = table(tmp_path, "throw_id,x,y\n1,0.8,0.1\n2,0.9,0.2\n3,1,0\n")
+    names = ["throw_1_take2", "throw_2_take3", "throw_3_take1"]
+    read = check_rows(read_outcomes(path), names, names)
+    assert [x for x, *_ in places_of(names, read).values()] == [0.8, 0.9, 1.0]
+    assert missing_outcomes(["throw_3_take1", "throw_4_take2"], read) == ["throw_4_take2"]
+
+
+def test_two_numbers_that_fit_all_rows_are_refused_until_rows_are_called_by_the_recordings():
+    names = ["throw_1_take2", "throw_2_take1"]
+    with pytest.raises(InvalidDemonstrationsError, match=r"throw_1_take2 may be row 1 or row 2: "):
+        paired(names, ["1", "2"])
+    assert paired(names, names[::-1]) == names

@@ -330,8 +330,7 @@ class Recordings:
         if self.options.rests and {*motions}.isdisjoint(found.episodes):
             return in_order(self.source, motions, found, ways_back(self.episodes))
         # Where some are asked for, the table may be of other sources, too.
-        check_rows(found, motions, self.there, others=self.options.episodes is not None)
-        return found
+        return check_rows(found, motions, self.there, others=self.options.episodes is not None)
 
     def demonstrations(
         self, selection: Selection, outcomes: Outcomes, wanted: Wanted

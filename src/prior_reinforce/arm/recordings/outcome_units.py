@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Bool, Float
 
 from prior_reinforce.arm.recordings.outcomes import SD, Outcomes
 from prior_reinforce.arm.recordings.units import (
@@ -17,11 +18,13 @@ from prior_reinforce.arm.recordings.units import (
     listed,
 )
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
-from prior_reinforce.units import base_of, factor, kind_of, looks_like
+from prior_reinforce.units import base_of, factor, kind_of, looks_like, units_of
 
 _FAR, _FEW = 10.0, 3
 """Times as far as all others that an outcome is in another unit, and outcomes of which it is not
 yet known how far they lie apart. Ours."""
+_AMONG = 1.25
+"""Times farther or nearer than all others that one is still among them. Ours."""
 _NEAR_THE_BASE = 0.05
 """So near the base along a component, in [m], hardly any table of outcomes stays. Ours: a throw
 straight ahead scatters as much to the side; then the units are to be said in the head."""
@@ -56,7 +59,7 @@ def in_units(
             f"{SD} in {where} is one number for components in {', '.join(wanted)}; leave that "
             "column out"
         )
-    _refuse_odd_row(outcomes, wanted)
+    _refuse_odd_row(outcomes, wanted, given)
     reach = np.abs(outcomes.values).max(axis=0, initial=0.0, where=~np.isnan(outcomes.values))
     unsaid = {
         j: unit
@@ -143,20 +146,54 @@ def _refuse_one_unit(outcomes: Outcomes, wanted: Sequence[str], unclear: Sequenc
         )
 
 
-def _refuse_odd_row(outcomes: Outcomes, units: Sequence[str]) -> None:
-    """Refuse a few rows that are in another unit than the others: 95 beside 0.8 and 1.05.
+def _refuse_odd_row(outcomes: Outcomes, units: Sequence[str], given: str | None) -> None:
+    """Refuse a few rows in another unit than the others: 95 beside 0.8 and 1.05, or 0.9 beside 80.
 
-    InvalidDemonstrationsError names them, if an arm reaches the others and not these.
+    InvalidDemonstrationsError names them: an arm reaches the others and not these, or in another
+    unit they would lie among the others. `given` confirms the second where units are stated.
     """
-    columns = np.abs(outcomes.values).T
-    for column, own, unit in zip(columns, outcomes.units, units, strict=True):
-        odd = np.array([judge_unit(unit, number) not in (unit, None) for number in column])
-        if not 0 < odd.sum() < len(odd) / 2 or (own and is_possible(own, max(column[odd]))):
-            continue
-        others = np.nanmax(column[~odd], initial=0.0)
-        if min(column[odd]) > _FAR * others:
-            raise InvalidDemonstrationsError(
-                f"in {outcomes.where}, {listed(np.array(outcomes.episodes)[odd].tolist())} is in "
-                f"another unit than the others: {min(column[odd]):g} beside {others:g} at most; "
-                "write all in one, and name it in the head"
-            )
+    numbers, right = np.abs(outcomes.values).T, ""
+    for number, own, unit in zip(numbers, outcomes.units, units, strict=True):
+        odd = np.array([judge_unit(unit, each) not in (unit, None) for each in number])
+        few = 0 < odd.sum() < len(odd) / 2 and not (own and is_possible(own, max(number[odd])))
+        if few and min(number[odd]) > _FAR * np.nanmax(number[~odd], initial=0.0):
+            break
+    else:
+        stated = None not in outcomes.units
+        if outcomes.sources or (given is not None and stated):
+            return
+        number, odd = _odd_lengths(outcomes, units, given)
+        right = ", or confirm them with --outcome-unit m" * stated
+    if odd.any():
+        episodes = listed(np.array(outcomes.episodes)[odd].tolist())
+        least, most = np.nanmin(number[~odd]), np.nanmax(number[~odd])
+        raise InvalidDemonstrationsError(
+            f"in {outcomes.where}, {episodes} is in another unit than the others: "
+            f"{min(number[odd]):.4g} beside {least:.4g} to {most:.4g}; write all in one, and name "
+            f"it in the head{right}"
+        )
+
+
+def _odd_lengths(
+    outcomes: Outcomes, units: Sequence[str], given: str | None
+) -> tuple[Float[np.ndarray, " n"], Bool[np.ndarray, " n"]]:
+    """Size of each row's lengths together, as written; and the few far from all others by units."""
+    lengths = [j for j, unit in enumerate(units) if kind_of(unit) == "length"]
+    values = np.nan_to_num(outcomes.values[:, lengths])
+    number = np.linalg.norm(values / np.array(outcomes.scale)[lengths], axis=1)
+    around = len(values) > 0 and np.all((values.min(axis=0) < 0) & (values.max(axis=0) > 0))
+    if not number.any() or (around and len(lengths) == 1):  # near zero is among the others
+        return number, number < 0
+    usual = float(np.median(number[number > 0]))
+    unsaid = [units[j] for j in lengths if outcomes.units[j] is None]
+    own = base_of(given or judge_unit(unsaid[0], usual) or unsaid[0])[1] if unsaid else 1.0
+    size = np.linalg.norm(values, axis=1) * own
+    ranked = np.sort(size[size > 0])
+    apart = _FAR if around else _FAR / _AMONG
+    others = max(np.split(ranked, np.flatnonzero(ranked[1:] > apart * ranked[:-1]) + 1), key=len)
+    far = (size > 0) & ((size < others[0]) | (size > others[-1]))
+    if len(others) < max(_FEW, far.sum() + 1):
+        return number, number < 0
+    by_unit = np.outer(list(units_of("length").values()), number)
+    among = (by_unit > others[0] / _AMONG) & (by_unit < others[-1] * _AMONG)
+    return number, far & among.any(axis=0)

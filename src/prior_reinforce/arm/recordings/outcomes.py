@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from prior_reinforce.arm.recordings.numbering import digits_at_end, number_of, telling_word
 from prior_reinforce.arm.recordings.recording import EPISODE_COLUMNS
 from prior_reinforce.arm.recordings.tables import Table, read_table
 from prior_reinforce.arm.recordings.units import (
@@ -49,10 +50,6 @@ _FILE = re.compile(
     re.IGNORECASE,
 )
 """Path of a recording, or of what was filmed beside it, by which a row may call its episode."""
-_DATED = re.compile(
-    r"(19|20)\d\d([-_.]?)[01]\d\2[0-3]\d([T_ .-]?[0-2]\d[-_.:h]?[0-5]\d([-_.:m]?[0-5]\d.*)?)?$"
-)
-"""A date, or one with its time of day, at the end of a name."""
 _UNCERTAINTY = re.compile(r"(.*[^a-z])?(sd|std|stdev|sigma|stderr|uncertainty)([^a-z].*)?|.*±.*")
 _SEMICOLONS = "semicolons, where a comma is the decimal sign"
 _RADII = ("r", "radius", "distance", "dist", "range")
@@ -87,6 +84,10 @@ class Outcomes:
     """Whether the source names the components."""
     sources: tuple[str, ...] = ()
     """Cells by row of a column `source`, if there is one: whose answers they are."""
+    word: str = ""
+    """Word in the episodes' names whose number a row may give instead of the one at the end."""
+    scale: tuple[float, ...] = ()
+    """What each component's numbers were multiplied with."""
 
     def only(self, names: Sequence[str]) -> Outcomes:
         """Return some of the components, in that order.
@@ -123,7 +124,8 @@ class Outcomes:
         where = f"{self.where} ({', '.join(said)})" if said else self.where
         units = tuple(self.units[i] for i in at)
         values = self.values[:, list(at)] * np.array(signs, dtype=float)
-        return replace(self, where=where, values=values, names=tuple(names), units=units)
+        kept = replace(self, scale=tuple(self.scale[i] for i in at))
+        return replace(kept, where=where, values=values, names=tuple(names), units=units)
 
     @classmethod
     def of_numbers(cls, where: str, numbers: Mapping[str, Sequence[float]]) -> Outcomes:
@@ -141,7 +143,8 @@ class Outcomes:
         n, k = len(numbers), lengths.pop()
         values = np.array([*numbers.values()], dtype=np.float64).reshape(n, k)
         names = tuple(map(str, range(1, k + 1)))
-        return cls(where, (*numbers,), values, np.zeros(n), names, (None,) * k, named=False)
+        none, scale = (None,) * k, (1.0,) * k
+        return cls(where, (*numbers,), values, np.zeros(n), names, none, named=False, scale=scale)
 
 
 def _columns_of(names: Sequence[str], there: Sequence[str]) -> dict[str, list[tuple[int, int]]]:
@@ -262,7 +265,8 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
     bare = tuple(base_of(unit)[0] if unit else None for unit in units)
     values = np.array(places).reshape(len(rows), len(kept))
     found = Outcomes(str(path), (*rows,), values, np.array(sds), (*kept,), bare, sd_unit)
-    return replace(found, sources=tuple(sources))
+    word = lower[key].split("_")[0]
+    return replace(found, sources=tuple(sources), word=word, scale=tuple(scale))
 
 
 def _doubt_thousands(path: Path, table: Table, columns: Mapping[int, str | None]) -> None:
@@ -308,7 +312,7 @@ def _finite(path: Path, table: Table, row: int, column: int) -> float:
 
 def places_of(episodes: Sequence[str], outcomes: Outcomes) -> dict[str, Place]:
     """Return where each episode's object landed, if that is known, by the rule of `outcomes_of`."""
-    picked = _matched(episodes, outcomes.episodes)
+    picked = _matched(episodes, outcomes)
     rows = {episode: outcomes.episodes.index(name) for episode, name in picked.items()}
     return {
         episode: (*outcomes.values[row].tolist(), float(outcomes.sd[row]))
@@ -319,40 +323,46 @@ def places_of(episodes: Sequence[str], outcomes: Outcomes) -> dict[str, Place]:
 
 def missing_outcomes(episodes: Sequence[str], outcomes: Outcomes) -> list[str]:
     """Return the episodes that a table lacks, by the rule of `outcomes_of`."""
-    picked = _matched(episodes, outcomes.episodes)
+    picked = _matched(episodes, outcomes)
     return [episode for episode in episodes if episode not in picked]
 
 
 def check_rows(
     outcomes: Outcomes, chosen: Sequence[str], there: Sequence[str], *, others: bool = False
-) -> None:
+) -> Outcomes:
     """Check that every row is of one of the `chosen` episodes, or of another that is `there`.
 
     With `others`, rows of none are no mistake unless the table looks numbered from another number.
+    Returns the outcomes with the `word` that holds for the episodes.
 
     Raises:
         InvalidDemonstrationsError: A row is of none; so is the last if the rows are numbered from 1
-            and the episodes from 0.
+            and the episodes from 0; or several numbers in the names fit, as in `telling_word`.
     """
-    rows, picked = outcomes.episodes, _matched(chosen, outcomes.episodes).values()
-    known = {*there, *picked} | {digits_at_end(name) for name in there} - {""}
+    rows = outcomes.episodes
+    word = telling_word(outcomes.word, chosen, there, rows)
+    outcomes = replace(outcomes, word=word)
+    picked = _matched(chosen, outcomes).values()
+    known = {*there, *picked} | {number_of(name, word) for name in there} - {""}
     unknown = [name for name in rows if name not in known and digits_at_end(name) not in known]
     if unknown and {*outcomes.names} & {*there}:
         raise InvalidDemonstrationsError(
             f"{outcomes.where} has a row for {listed(unknown)} and a column for each episode; "
             "exchange rows and columns"
         )
-    if unknown and (not others or _renumber(there, rows)):
+    if unknown and (not others or _renumber(there, outcomes)):
         raise InvalidDemonstrationsError(
             f"{outcomes.where} names episodes {listed(unknown)} that were not found (there are "
-            f"{listed(there)}); {_renumber(there, rows)}correct the names, or take out the rows of "
-            "what was not recorded"
+            f"{listed(there)}); {_renumber(there, outcomes)}correct the names, or take out the "
+            "rows of what was not recorded"
         )
+    return outcomes
 
 
-def _renumber(episodes: Sequence[str], rows: Sequence[str]) -> str:
+def _renumber(episodes: Sequence[str], outcomes: Outcomes) -> str:
     """What to do where rows may be numbered from another number than the episodes; else empty."""
-    ours, theirs = ([digits_at_end(name) for name in names] for names in (episodes, rows))
+    ours = [number_of(name, outcomes.word) for name in episodes]
+    theirs = [digits_at_end(name) for name in outcomes.episodes]
     if not (all(ours) and all(theirs) and ours and theirs) or len({*ours}) < len(ours):
         return ""
     first, of_table = min(map(int, ours)), min(map(int, theirs))
@@ -388,18 +398,18 @@ def outcomes_of(
 ) -> tuple[Points, Points]:
     """Return each episode's outcome in order, and its standard deviation, each (N, k).
 
-    Episodes are matched by name, else by the number at the end of their names (`3` is `demo_003`).
-    `advice` is for who lacks some.
+    Episodes are matched by name, else by the number behind the outcomes' `word` or at the end of
+    their names (`3` is `demo_003`). `advice` is for who lacks some.
 
     Raises:
         InvalidDemonstrationsError: Outcomes that are missing or not finite; each is named.
     """
     there = outcomes.episodes
-    picked, missing = _matched(episodes, there), missing_outcomes(episodes, outcomes)
+    picked, missing = _matched(episodes, outcomes), missing_outcomes(episodes, outcomes)
     if missing:
         raise InvalidDemonstrationsError(
             f"no outcome for episodes {listed(missing)} in {outcomes.where} (it has "
-            f"{listed(there) or 'none'}); {_renumber(episodes, there)}measure and add them, or "
+            f"{listed(there) or 'none'}); {_renumber(episodes, outcomes)}measure and add them, or "
             f"leave those episodes out{'; ' * bool(advice)}{advice}"
         )
     rows = [there.index(picked[episode]) for episode in episodes]
@@ -413,9 +423,11 @@ def outcomes_of(
     return values, np.tile(outcomes.sd[rows, None], values.shape[1])
 
 
-def _matched(episodes: Sequence[str], names: Sequence[str]) -> dict[str, str]:
-    """Name in the table by episode; a number at the end of two names matches none."""
-    numbers, there = list(map(digits_at_end, episodes)), list(map(digits_at_end, names))
+def _matched(episodes: Sequence[str], outcomes: Outcomes) -> dict[str, str]:
+    """Name in the table by episode; a number of two names matches none."""
+    names = outcomes.episodes
+    numbers = [number_of(episode, outcomes.word) for episode in episodes]
+    there = list(map(digits_at_end, names))
     picked: dict[str, str] = {}
     for episode, number in zip(episodes, numbers, strict=True):
         if episode in names:
@@ -423,12 +435,3 @@ def _matched(episodes: Sequence[str], names: Sequence[str]) -> dict[str, str]:
         elif number and numbers.count(number) == 1 and there.count(number) == 1:
             picked[episode] = names[there.index(number)]
     return picked
-
-
-def digits_at_end(name: str) -> str:
-    """Return the number at the end of a name, without leading zeros; empty if there is none.
-
-    The last digits of a time, `2024-05-03_14-02-03`, are no number of an episode.
-    """
-    match = re.search(r"0*([0-9]+)$", name)
-    return match[1] if match and not _DATED.search(name) else ""

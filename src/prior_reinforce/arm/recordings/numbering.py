@@ -1,0 +1,68 @@
+"""Which number in the names of recordings the rows of a table give."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from prior_reinforce.errors import InvalidDemonstrationsError
+
+_DATE = r"(?:(?:19|20)\d\d([-_.]?)[01]\d\1[0-3]\d|[0-3]\d([-_.])[01]\d\2(?:19|20)\d\d)"
+_DATED = re.compile(_DATE + r"([T_ .-]?[0-2]\d[-_.:h]?[0-5]\d([-_.:m]?[0-5]\d.*)?)?$")
+"""A date, or one with its time of day, at the end of a name."""
+_NUMBER = re.compile(r"([^\W\d_]*)([\W_]*)0*([0-9]+)")
+"""A number, and the word or the signs before it."""
+
+
+def digits_at_end(name: str) -> str:
+    """Return the number at the end of a name, without leading zeros; empty if there is none.
+
+    The last digits of a time, `2024-05-03_14-02-03`, are no number of an episode.
+    """
+    match = re.search(r"0*([0-9]+)$", name)
+    return match[1] if match and not _DATED.search(name) else ""
+
+
+def number_of(name: str, word: str) -> str:
+    """Return the number behind a word in a name, else the one at its end, without leading zeros."""
+    return _numbers(name).get(word) or digits_at_end(name)
+
+
+def _numbers(name: str) -> dict[str, str]:
+    """Numbers that are no dates, by the word before each, or by the signs if there is none."""
+    found = _NUMBER.findall(re.sub(_DATE, "#", name))
+    return {word.lower() or signs or "#": number for word, signs, number in found}
+
+
+def telling_word(
+    word: str, episodes: Sequence[str], there: Sequence[str], rows: Sequence[str]
+) -> str:
+    """Return the word if rows give the number behind it; empty if they give the one at the end.
+
+    The first counts if it tells the `episodes` apart, unless only the other is `there` for all rows
+    that are no whole names.
+
+    Raises:
+        InvalidDemonstrationsError: Other numbers are there for all rows, too; the word decides not.
+    """
+    wanted = {digits_at_end(row) for row in rows if row not in there} - {""}
+    if not wanted or not episodes:
+        return ""
+    apart, fitting = dict[str, list[str]](), list[str]()
+    for label in ["", *_numbers(episodes[0])]:
+        numbers = [number_of(name, label) for name in episodes]
+        every = {number_of(name, label) for name in there}
+        shared = not label or all(label in _numbers(name) for name in episodes)
+        if shared and len({*numbers} - {""}) == len(episodes) and len(every) >= min(2, len(there)):
+            apart[label] = numbers
+            fitting += [label] * (wanted <= every)
+    if word in apart and (word in fitting or "" not in fitting):
+        return word
+    for label in fitting if "" in fitting else ():
+        for name, one, other in zip(episodes, apart[label], apart[""], strict=True):
+            if one != other:
+                raise InvalidDemonstrationsError(
+                    f"{name} may be row {one} or row {other}: either number in the names is there "
+                    f"for all rows; call the rows by the recordings' names ({name})"
+                )
+    return ""
