@@ -14,6 +14,7 @@ from jaxtyping import Float
 from msgspec import Meta
 
 from prior_reinforce.arm.recordings.clock import LONGEST
+from prior_reinforce.arm.recordings.failed_reads import failed_reads, stalls
 from prior_reinforce.arm.recordings.leaps import refuse_leaps
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.units import say_names
@@ -214,7 +215,7 @@ def copies(plans: Plans, names: Sequence[str]) -> str:
     return ""
 
 
-_Kind = IntEnum("_Kind", ["SLOW", "ENDS", "GAP", "READING", "STEP", "LONG"])
+_Kind = IntEnum("_Kind", ["SLOW", "ENDS", "GAP", "FAILED", "READING", "STEP", "LONG"])
 """What a remark is about, the most important first."""
 
 
@@ -227,13 +228,18 @@ def _remarks(
     *,
     held: bool,
 ) -> Iterator[tuple[_Kind, str]]:
-    """Warnings about one episode: gaps, jumps, and ends in mid-swing."""
+    """Warnings about one episode: gaps, failed reads, jumps, and ends in mid-swing."""
     t, steps = recording.times, np.diff(recording.times)
     within = (t[1:] > span[0]) & (t[:-1] < span[1])
     still = np.all(np.diff(recording.positions, axis=0) == 0, axis=1)
     worst = int(np.argmax(np.where(within & ~still, steps, 0.0)))
     if not still[worst] and steps[worst] > _GAP * recording.period:
         yield _Kind.GAP, f"nothing recorded for {steps[worst]:.3f} s at {t[worst]:.2f} s"
+    for start, wait in stalls(recording):
+        what = "nothing recorded in mid-motion for"
+        yield _Kind.GAP, f"{what} {wait:.3f} s at {start:.2f} s: one frame again and again"
+    for remark in failed_reads(recording, units, signals.trim_band):
+        yield _Kind.FAILED, remark
     if jumping:
         yield _Kind.STEP, f"{', '.join(jumping)} jumps; no spline goes through it"
     for remark in recording.remarks:

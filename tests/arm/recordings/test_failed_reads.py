@@ -1,0 +1,70 @@
+"""Frames that a recorder did not read are remarked; what an arm or a gripper may do is not."""
+
+import numpy as np
+import pytest
+
+from prior_reinforce.arm.recordings.preprocessing import Preprocessing, preprocess
+from prior_reinforce.arm.recordings.recording import Recording
+from tests.arm.recordings.recorded import JOINTS, sampled
+
+
+def remarks(t, q, names=JOINTS):
+    units = ("rad",) * len(names)
+    return preprocess([Recording("7", t, q, names)], units, Preprocessing()).remarks
+
+
+def with_stall(t, q, first, frames):
+    held = q.copy()
+    held[first : first + frames] = q[first]
+    return remarks(t, held)
+
+
+def about(said):
+    """Those of remarks that this file is about."""
+    return [one for one in said if "a read failed" in one or "in mid-motion" in one]
+
+
+@pytest.mark.parametrize("value", [0.0, -1.5, 7.0])
+@pytest.mark.parametrize("sigma", [0.0, 1e-3])
+def test_one_frame_of_one_joint_off_its_course_is_remarked(value, sigma):
+    t, q = sampled(1, 50)
+    q += sigma * np.random.default_rng(0).normal(size=q.shape)
+    q[40, 3] = value
+    (said,) = about(remarks(t, q))
+    values = f"joint4 is {value:.4g} rad in frame 40 alone (0.800 s), between {q[39, 3]:.4g} and "
+    assert said.startswith("7: " + values)
+    assert said.endswith("write their middle there, or leave that episode out (--leave-out)")
+    q[55, 3] = value
+    assert len(about(remarks(t, q))) == 2
+
+
+@pytest.mark.parametrize(("rate", "frames"), [(100, 6), (100, 10), (500, 30), (30, 5)])
+def test_one_frame_again_and_again_in_mid_motion_is_remarked(rate, frames):
+    t, q = sampled(1, rate)
+    first = round(0.7 * rate)
+    (said,) = about(with_stall(t, q, first, frames))
+    assert said == (
+        f"7: nothing recorded in mid-motion for {frames / rate:.3f} s at {t[first]:.2f} s: one "
+        "frame again and again"
+    )
+
+
+@pytest.mark.parametrize("rate", [15, 20, 30, 100, 500])
+def test_what_an_arm_or_a_recorder_may_do_is_not_remarked(rate):
+    t, q = sampled(1, rate)
+    rng = np.random.default_rng(rate)
+    dwell = np.interp(t, [0, 0.9, 1.2, 3], [0, 0.9, 0.9, 2.7])
+    flick = q.copy()
+    flick[:, 6] += 0.5 * np.maximum(np.cos(np.pi * np.clip((t - 0.81) / 0.2, -0.5, 0.5)), 0) ** 2
+    for motion in (
+        q,
+        q + 1e-3 * rng.normal(size=q.shape),
+        np.round(q, 2),
+        np.array([q[np.searchsorted(t, at)] for at in dwell]),
+        q[np.arange(len(t)) // 3 * 3],
+        flick,
+    ):
+        assert not about(remarks(t, motion))
+    pulse = np.column_stack([q, t == t[len(t) // 2], t > 0.9])
+    assert not about(remarks(t, pulse, (*JOINTS, "gripper", "column9")))
+    assert not about(remarks(t, pulse, tuple(f"column{i}" for i in range(9))))
