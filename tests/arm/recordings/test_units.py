@@ -42,6 +42,11 @@ from prior_reinforce.units import base_of
         ("elbowRadius", "elbowRadius", None),
         ("base_turn", "base_turn", None),
         ("base [rev]", "base", "rev"),
+        ("Gelenk 1 in °", "Gelenk 1", "deg"),
+        ("x in cm", "x", "cm"),
+        ("x_in_cm", "x", "cm"),
+        ("x in [cm]", "x", "cm"),
+        ("plug in", "plug in", None),
     ],
 )
 def test_a_unit_that_stands_in_a_channels_name(column, name, unit):

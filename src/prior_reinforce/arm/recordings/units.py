@@ -32,8 +32,8 @@ _PLAUSIBLE: Mapping[str, Mapping[str, tuple[float, float]]] = {
 greatest number: of angles and lengths the largest one, of periods the time between two frames.
 Ours: no joint turns two turns; above 300, millimetres are likelier than an arm of three metres; no
 gripper opens by 30 cm; one that moves by less than a percent is recorded as a share."""
-_BRACKETS = re.compile(r"(?P<name>.+?)\s*[\[(]\s*(?P<unit>[^\[\]()]+?)\s*[\])]")
-_ENDING = re.compile(r"(?P<name>.+?)[_ ](?P<unit>[a-zµμ°]+)")
+_BRACKETS = re.compile(r"(?P<name>.+?)(?: in)?\s*[\[(]\s*(?P<unit>[^\[\]()]+?)\s*[\])]")
+_ENDING = re.compile(r"(?P<name>.+?)(?:[_ ]in)?[_ ](?P<unit>[a-zµμ°]+)")
 _CAMEL = re.compile(r"(?P<name>.*[a-z0-9])(?P<unit>[A-Z][a-z]+|DEG|RAD|MM|CM|MS|US|NS)")
 """`panDeg`."""
 _NO_ENDING = {
