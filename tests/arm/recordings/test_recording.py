@@ -35,6 +35,12 @@ def test_what_was_recorded_is_copied_and_starts_at_zero():
     [
         ([0, np.inf, 2], [[0]] * 3, "episode a: time is inf at frame 1"),
         ([0, 2, 1], [[0]] * 3, r"time does not increase at frame 2 \(2 s, then 1 s\)"),
+        ([0, 2, 1], [[0]] * 3, "; sort frames"),
+        (
+            [0, 1, 1],
+            [[0], [1], [2]],
+            r"frame 2 \(1 s, then 1 s\); .*coarse.*-column none --rate HZ",
+        ),
         ([0, 1], [[0]] * 3, r"times \(2,\) and positions \(3, 1\) for 1 channels"),
         ([0, 1], [["a"], ["b"]], "episode a must hold numbers"),
         ([0], [[0]], "T >= 2"),

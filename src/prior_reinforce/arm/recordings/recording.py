@@ -142,10 +142,14 @@ class Recording:
             remarks += (f"{same.sum()} frames were recorded twice; once is kept",)
         if np.any(np.diff(times) <= 0):
             frame = int(np.argmax(np.diff(times) <= 0)) + 1
+            remedy = "sort frames that are out of order; if the clock was set back, leave that "
+            remedy += "episode out"
+            if np.all(np.diff(times) >= 0):
+                remedy = "it repeats, as of a coarse clock: read the frames at their known rate "
+                remedy += "with --time-column none --rate HZ, or by another --time-column"
             raise InvalidDemonstrationsError(
                 f"{episode}: time does not increase at frame {frame} ({times[frame - 1]:g} s, then "
-                f"{times[frame]:g} s); sort frames that are out of order; if "
-                "the clock was set back, leave that episode out"
+                f"{times[frame]:g} s); {remedy}"
             )
         times -= times[0]
         times.setflags(write=False)
