@@ -465,3 +465,39 @@ def test_a_first_frame_without_a_number_is_no_line_of_names(tmp_path):
     (tmp_path / "a.csv").write_text("\n".join(["time,pan,lift", *rows]))
     (read,) = read_recordings(tmp_path / "a.csv")
     assert (read.names, len(read.times)) == (("pan", "lift"), 9)
+
+
+@pytest.mark.parametrize(
+    ("head", "column"),
+    [("t,pan,lift", False), ("# t,pan,lift", False), ("0,1,2", False), ("t,pan,lift", True)],
+)
+def test_a_head_that_comes_again_within_a_motion_is_refused(tmp_path, head, column):
+    rows = [f"{k / 10},{k / 4},{-k / 2}" for k in range(9)]
+    lines = [head, *rows[:3], head, *rows]
+    if column:
+        lines = [f"{line},{'trial' if line == head else 7}" for line in lines]
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    with pytest.raises(FileFormatError, match=r"a\.csv, line 5: the head comes again: two logs"):
+        read_recordings(tmp_path / "a.csv", time_column="1")
+    if column:  # where the episode changes, it does no harm
+        (tmp_path / "a.csv").write_text("\n".join(lines).replace(",7", ",6", 3))
+        assert len(read_recordings(tmp_path / "a.csv", time_column="1")) == 2
+
+
+@pytest.mark.parametrize("index", [False, True])
+def test_columns_that_pandas_numbers_are_called_by_their_places(tmp_path, index):
+    t, q = sampled(0, 50)
+    pd.DataFrame(np.column_stack([t, q])).to_csv(tmp_path / "a.csv", index=index)
+    with pytest.raises(UnclearUnitsError, match="looks like the time") as caught:
+        read_recordings(tmp_path)
+    assert caught.value.options == f"--time-column {1 + index}"
+    (read,) = read_recordings(tmp_path, time_column=str(1 + index))
+    assert (read.names, read.named) == (tuple(f"column{i + index}" for i in range(2, 9)), False)
+    np.testing.assert_allclose(read.times, t)
+    np.testing.assert_allclose(read.positions, q)
+    pd.DataFrame(q, index=np.arange(len(q)) + 40).to_csv(tmp_path / "a.csv")  # rows cut out
+    (read,) = read_recordings(tmp_path, rate=50)
+    np.testing.assert_allclose(read.positions, q)
+    pd.DataFrame(q, index=pd.Index(t, name="t")).to_csv(tmp_path / "a.csv")
+    (read,) = read_recordings(tmp_path)
+    assert (read.clock, read.named) == ("t in s", False)

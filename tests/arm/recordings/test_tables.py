@@ -221,3 +221,66 @@ def test_a_time_of_day_goes_on_at_midnight(tmp_path):
     ):
         (tmp_path / "a.csv").write_text("clock,a\n{},1\n{},2\n".format(*cells.split(",")))
         assert read_table(tmp_path / "a.csv").stamps(0)[1] == step * 1e9
+
+
+FLOATS = pd.DataFrame(0.3 + np.outer(np.linspace(0, 1, 40) ** 2, [1, -1, 2]))
+
+
+@pytest.mark.parametrize(
+    ("write", "names"),
+    [
+        (dict(index=False), ("column 1", "column 2", "column 3")),
+        (dict(), ("column 2", "column 3", "column 4")),
+        (dict(index_label="t"), ("t", "column 2", "column 3", "column 4")),
+    ],
+)
+@pytest.mark.parametrize("scale", [1, 1000])
+def test_numbers_that_pandas_writes_over_columns_without_names_are_no_row(
+    tmp_path, write, names, scale
+):
+    frame = FLOATS if scale == 1 else (scale * FLOATS).astype(int)
+    frame.to_csv(tmp_path / "a.csv", **write)
+    table = read_table(tmp_path / "a.csv")
+    assert (table.names, table.named, len(table)) == (names, False, 40)
+    np.testing.assert_allclose(table.values[:, -3:], frame)
+
+
+def test_an_index_without_a_name_before_such_numbers_stays(tmp_path):
+    FLOATS.set_axis(FLOATS.index / 10).to_csv(tmp_path / "a.csv")
+    table = read_table(tmp_path / "a.csv")
+    assert table.names == ("", "column 2", "column 3", "column 4")
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        ("0,1,2", "0,1,2", "0,1,2", "0,1,2"),
+        ("0,1,2", "1,2,3", "2,3,4", "3,4,5"),
+        ("0,1", "20,1", "39,0", "60,0"),
+        ("0,1", "1,0.98", "2,0.95", "3,0.9"),
+        ("push,0,1", "push,0.1,0.98", "push,0.2,0.95", "push,0.3,0.9"),
+        ("nan,0,1", "0.4,0.1,0.98", "0.3,0.2,0.95", "0.2,0.3,0.9"),
+    ],
+)
+def test_a_first_frame_may_hold_such_numbers(tmp_path, rows):
+    (tmp_path / "a.csv").write_text("\n".join(rows))
+    table = read_table(tmp_path / "a.csv")
+    assert (table.named, len(table)) == (False, 4)
+
+
+def test_numbers_that_may_be_a_frame_or_a_head_are_refused(tmp_path):
+    (tmp_path / "a.csv").write_text("0,1,2\n0,-1,3\n2,-3,5\n3,-5,7\n")
+    with pytest.raises(FileFormatError, match=r"a\.csv: 0,1,2 may be a frame, or numbers of"):
+        read_table(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_room_at_the_end_that_a_log_did_not_use_holds_nothing(tmp_path, encoding):
+    (tmp_path / "a.csv").write_bytes("t,a\n0,1\n1,2\n".encode(encoding) + bytes(64))
+    np.testing.assert_array_equal(numbers(read_table(tmp_path / "a.csv")), [[0, 1], [1, 2]])
+
+
+def test_nul_bytes_elsewhere_are_called_so(tmp_path):
+    (tmp_path / "a.csv").write_bytes(b"t,a\n0,1\n1,\0\0\n2,3\n")
+    with pytest.raises(FileFormatError, match=r"a\.csv, line 3: NUL bytes.* tr -d '\\0' <"):
+        read_table(tmp_path / "a.csv")

@@ -92,6 +92,11 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         remarks = (of_none,) * (0 < rows < len(names))
         for episode in sorted({*names} - {""} or {""}, key=natural_order):
             own = table.rows([i for i, name in enumerate(names) if name == episode])
+            for line in (line for line in own.heads if own.lines[0] < line < own.lines[-1]):
+                raise FileFormatError(
+                    f"{path}, line {line}: the head comes again: two logs in one file; keep the "
+                    "part that is this motion, or take that line out if the motion goes on"
+                )
             yield episode, partial(_episode, own, episode, options, column, guessed, said, remarks)
 
 
@@ -180,7 +185,8 @@ def _episode(
         remarks.append(f"{log.name}: time in {log.time_unit}, motion is {log.key} (measured)")
     clock = clock_of_table(table, episode, times, options, above, log and log.time_unit)
     counts = [i for i in others if table.is_number(i) and counts_rows(table, i, clock.times)]
-    rising = [i for i in counts if channels == others and table.named and not options.joints]
+    plain = channels == others and table.named and not options.joints
+    rising = [i for i in counts if plain or (i in channels and is_unnamed(table.names[i]))]
     all_read = not options.key and found is None
     texts = [i for i in others if table.is_text(i)]
     if not all_read:  # else only those that change between a few: `on` and `off`
@@ -196,7 +202,7 @@ def _episode(
     is_named = named or said.keys() >= {*channels}
     own_names = [said.get(i, name) for i, name in zip(channels, own, strict=True)]
     if not is_named:  # by their places in the file
-        own_names = [] if table.named else [table.names[i].replace(" ", "") for i in channels]
+        own_names = [] if table.named else [called[i].replace(" ", "") for i in channels]
     unnamed = [i for i in counts if is_unnamed(table.names[i])]
     rest = [i for i in others if i not in channels and i not in unnamed]
     return recorded(

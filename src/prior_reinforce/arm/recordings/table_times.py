@@ -6,7 +6,7 @@ import re
 import shlex
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import combinations, islice
+from itertools import combinations, islice, product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -102,7 +102,7 @@ def called_times(table: Table, options: ReadOptions) -> list[int]:
     if options.time_column is not None:
         none = options.time_column == NO_COLUMN
         return [] if none else [named_column(table, options.time_column, "--time-column")]
-    bare = (split_unit(name, SECONDS)[0].lower() for name in table.names if table.named)
+    bare = (split_unit(name, SECONDS)[0].lower() for name in table.names)
     found = [i for i, name in enumerate(bare) if name in _TIMES]
     return [i for i in found if len({*table.cells[i]}) > 1] or found  # a date alone stands still
 
@@ -110,9 +110,9 @@ def called_times(table: Table, options: ReadOptions) -> list[int]:
 def named_column(table: Table, name: str, option: str) -> int:
     """A column by its name, with or without the unit in it, or by its number from 1."""
     bare = [split_unit(n, SECONDS)[0] for n in table.names]
-    for names in (table.names, bare):
-        if name in names:
-            return names.index(name)
+    for one, names in product((name, f"column {name}"), (table.names, bare)):
+        if one in names:
+            return names.index(one)
     if name.isdigit() and 1 <= int(name) <= len(table.names):
         return int(name) - 1
     raise ConfigurationError(
@@ -152,7 +152,7 @@ def time_columns(
     rising = [i for i in free if rises(table.stamps(i))]
     skipping = [i for i in free if skips_frames(table.values[:, i])]
     called = [i for i in called if i in free]
-    called += [i for i in free if table.named and tells_time(table.names[i], table.stamps(i))]
+    called += [i for i in free if tells_time(table.names[i], table.stamps(i))]
     called += [i for i in free if i not in called and _are_dates(table, i)]
     _refuse_several(table, called)
     if called:
@@ -162,7 +162,7 @@ def time_columns(
     for i in free:
         if table.named and is_periods(table.names[i], table.values[:, i]):
             return TimeColumns((i,), summed=True)
-    nameless = [i for i in rising if table.named and is_unnamed(table.names[i])]
+    nameless = [i for i in rising if is_unnamed(table.names[i])]
     if nameless and table.nanoseconds(nameless[0]) is not None:
         return TimeColumns((nameless[0],))
     if options.rate is not None or _declared(table, above, options):
@@ -172,8 +172,8 @@ def time_columns(
         return TimeColumns((*skipping, *rising)[:1], unit=FRAME if skipping else None)
     if rising and len(table.names) > 1:
         first = rising[0]
-        shown = table.names[first] if table.named and table.names[first] else f"{first + 1}"
-        column = f"column {first + 1}" if shown.isdigit() else shown
+        shown = (table.names[first] or f"{first + 1}").removeprefix("column ")
+        column = f"column {shown}" if shown.isdigit() else shown
         what = f"{table.where} names no column of times, and {column} looks like the time"
         return TimeColumns((first,), (Ambiguity(what, f"--time-column {shlex.quote(shown)}"),))
     return TimeColumns()

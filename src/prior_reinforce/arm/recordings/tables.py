@@ -83,6 +83,8 @@ class Table:
     """Line or row of the file that each row stands in, from 1."""
     decimal: str = "."
     delimiter: str = ","
+    heads: tuple[int, ...] = ()
+    """Lines in which the line of names comes again."""
 
     def __len__(self) -> int:
         """Number of rows."""
@@ -181,13 +183,17 @@ def _read_csv(
     title = (
         [c.strip() for c in next(_split([above[0].lstrip(" #%/")], delimiter), [])] if above else []
     )
-    return replace(_table(str(path), rows, head, decimal, title), delimiter=delimiter)
+    table = _table(str(path), rows, head, decimal, title)
+    again = tuple(i for i, line in kept if i > data[0][0] and line in above)
+    if table.named and table.lines[:1] == (data[0][0],):  # its names are in that comment
+        table = replace(table, heads=again)
+    return replace(table, delimiter=delimiter)
 
 
 def _decoded(path: Path) -> str:
     content = path.read_bytes()
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return content.decode("utf-16")
+        return content.decode("utf-16").rstrip("\0")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -196,8 +202,14 @@ def _decoded(path: Path) -> str:
             raise FileFormatError(
                 f"{path} is no text in UTF-8; save it as CSV in UTF-8, or say its format"
             ) from None
-    if "\0" in text:
+    if "\0" in text and re.search(r"[\x01-\x08\x0e-\x19\x1b-\x1f]", text):
         raise FileFormatError(f"{path} is no text; expected a CSV: say its format")
+    text = text.rstrip("\0")  # room that a log did not use
+    if "\0" in text:
+        raise FileFormatError(
+            f"{path}, line {text.split(chr(0))[0].count(chr(10)) + 1}: NUL bytes, as where writing "
+            "was cut off; take them out, tr -d '\\0' < OLD.csv > NEW.csv, and mend that line"
+        )
     return text
 
 
@@ -313,13 +325,17 @@ def _table(
     if not any(_is_number(c, decimal) or _DATE.match(c) for c in first):
         names, rows = first, rows[1:]
     elif len(title) == len(first):
-        names = list(title)
+        names = first = list(title)
+    elif _numbers_columns(where, first, [row for _, row in rows if row != first], decimal):
+        names = [name if c.isdigit() else c for name, c in zip(names, first, strict=True)]
+        named, rows = False, rows[1:]
     else:
-        named = False
+        named, first = False, []
     if named and len(rows) > 1 and are_units(rows[0][1], decimal):
         units, rows = [known_unit(c) for c in rows[0][1]], rows[1:]
     check_names(where, names)
-    rows = [(i, row) for i, row in rows if row != names]  # a head that comes again
+    heads = tuple(i for i, row in rows if row == first)
+    rows = [(i, row) for i, row in rows if row != first]
     cells = [[row[i] for _, row in rows] for i in range(len(names))]
     columns = _without_lists(where, list(zip(names, units, cells, strict=True)))
     kept = [column for column in columns if not _is_padding(column[0], column[2])]
@@ -331,7 +347,32 @@ def _table(
         tuple(own for _, _, own in kept),
         tuple(number for number, _ in rows),
         decimal,
+        heads=heads,
     )
+
+
+def _numbers_columns(where: str, first: list[str], body: list[list[str]], decimal: str) -> bool:
+    """Whether the first row numbers columns without names from 0, as pandas does.
+
+    Its index may stand before them. In a frame, numbers below are as near as they ever are, and
+    some have no decimals. FileFormatError if it may be either.
+    """
+    start = first.index("0") if "0" in first else 0
+    if len(body) < 3 or first[start:] != [str(i) for i in range(len(first) - start)]:
+        return False
+    says = [_is_number(c, decimal) or is_value(c) for c in (*first[:start], *body[0][:start])]
+    if start:
+        return all(says[start:]) and not any(says[:start])
+    whole = [any(c.lstrip("+-").isdigit() for c in column) for column in zip(*body, strict=True)]
+    steps = np.abs(np.diff([[_number(c, decimal) for c in row] for row in (first, *body)], axis=0))
+    if whole.count(False) > 1 or np.any(steps[0] > 2 * steps[1:].max(axis=0)):
+        return True
+    if len(first) > 2 and np.any(steps[0] != steps[1]):
+        raise FileFormatError(
+            f"{where}: {','.join(first)} may be a frame, or numbers of columns as pandas writes "
+            "them; put a line of names above it if it is a frame, else in its place"
+        )
+    return False
 
 
 def _of_one_width(where: str, rows: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
