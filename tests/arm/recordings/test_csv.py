@@ -484,6 +484,13 @@ def test_a_head_that_comes_again_within_a_motion_is_refused(tmp_path, head, colu
         assert len(read_recordings(tmp_path / "a.csv", time_column="1")) == 2
 
 
+def test_a_head_that_comes_again_while_times_go_on_is_left_out(tmp_path):
+    rows = [f"{k / 10},{k / 4},{-k / 2}" for k in range(9)]
+    (tmp_path / "a.csv").write_text("\n".join(["t,pan,lift", *rows[:4], "t,pan,lift", *rows[4:]]))
+    (read,) = read_recordings(tmp_path / "a.csv")
+    assert (len(read.times), read.period) == (9, pytest.approx(0.1))
+
+
 @pytest.mark.parametrize("index", [False, True])
 def test_columns_that_pandas_numbers_are_called_by_their_places(tmp_path, index):
     t, q = sampled(0, 50)

@@ -16,7 +16,7 @@ import numpy as np
 
 from prior_reinforce.arm.recordings.beside import columns_beside, twin_vectors
 from prior_reinforce.arm.recordings.channels import Kind, kinds
-from prior_reinforce.arm.recordings.clock import FEWEST_COUNTS, NO_COLUMN
+from prior_reinforce.arm.recordings.clock import FEWEST_COUNTS, NO_COLUMN, Times
 from prior_reinforce.arm.recordings.heads import with_heads
 from prior_reinforce.arm.recordings.naming import find_channels, numbered_like, vectors, words
 from prior_reinforce.arm.recordings.options import ReadOptions
@@ -92,11 +92,6 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         remarks = (of_none,) * (0 < rows < len(names))
         for episode in sorted({*names} - {""} or {""}, key=natural_order):
             own = table.rows([i for i, name in enumerate(names) if name == episode])
-            for line in (line for line in own.heads if own.lines[0] < line < own.lines[-1]):
-                raise FileFormatError(
-                    f"{path}, line {line}: the head comes again: two logs in one file; keep the "
-                    "part that is this motion, or take that line out if the motion goes on"
-                )
             yield episode, partial(_episode, own, episode, options, column, guessed, said, remarks)
 
 
@@ -155,6 +150,17 @@ def _starts(table: Table, options: ReadOptions) -> list[int]:
     return [0, *falls] if anew and long else [0]
 
 
+def _refuse_second_log(table: Table, times: Times) -> None:
+    """FileFormatError if the head comes again within the rows, and times do not go on there."""
+    for line in table.heads:
+        row = int(np.searchsorted(table.lines, line))
+        if 0 < row < len(table) and times[row] <= times[row - 1]:
+            raise FileFormatError(
+                f"{table.where}, line {line}: the head comes again: two logs in one file; keep the "
+                "part that is this motion, or take that line out if the motion goes on"
+            )
+
+
 def _episode(
     table: Table,
     episode: str,
@@ -184,6 +190,7 @@ def _episode(
     if log is not None:
         remarks.append(f"{log.name}: time in {log.time_unit}, motion is {log.key} (measured)")
     clock = clock_of_table(table, episode, times, options, above, log and log.time_unit)
+    _refuse_second_log(table, clock.times if times.columns else np.zeros(len(table)))
     counts = [i for i in others if table.is_number(i) and counts_rows(table, i, clock.times)]
     plain = channels == others and table.named and not options.joints
     rising = [i for i in counts if plain or (i in channels and is_unnamed(table.names[i]))]
