@@ -68,3 +68,10 @@ def test_what_an_arm_or_a_recorder_may_do_is_not_remarked(rate):
     pulse = np.column_stack([q, t == t[len(t) // 2], t > 0.9])
     assert not about(remarks(t, pulse, (*JOINTS, "gripper", "column9")))
     assert not about(remarks(t, pulse, tuple(f"column{i}" for i in range(9))))
+
+
+def test_a_cusp_no_larger_than_a_step_beside_it_is_not_remarked():
+    """An angle about an axis, which turns back at half a turn as the axis turns round."""
+    t, q = sampled(1, 100)
+    q[:, 3] = np.pi - np.abs(0.005 + 0.03 * (np.arange(len(t)) - 90)) / (1 + 0.01 * t)
+    assert not about(remarks(t, q))

@@ -25,8 +25,8 @@ at most so many times or parts. Ours."""
 def failed_reads(recording: Recording, units: Sequence[str], still: Channels) -> Iterator[str]:
     """Say which channels are elsewhere for one frame, and before and after it on their course.
 
-    By more than they may stray while `still`, and than a few counts of an encoder. A gripper may be
-    meant to, and a switch, which rests before and after.
+    By more than they may stray while `still`, than a few counts of an encoder, and than they move
+    in a frame around it. A gripper may be meant to, and a switch, which rests before and after.
     """
     t, q, of = recording.times, recording.positions, np.array(units)
     if len(t) < 3 or 2 * recording.period > _THERE_AND_BACK:
@@ -40,7 +40,9 @@ def failed_reads(recording: Recording, units: Sequence[str], still: Channels) ->
         for k in np.flatnonzero(alone).tolist():
             beside = [*off[max(k - _AROUND, 0) : max(k - 1, 0), i], *off[k + 2 : k + _AROUND, i]]
             most = max(beside, default=np.inf)
-            if off[k, i] > _TIMES * most and (most > 0 or kind is Kind.ANGLE):
+            fastest = max([*steps[max(k - _AROUND, 0) : k, i], *steps[k + 2 : k + _AROUND, i]])
+            far = off[k, i] > max(_TIMES * most, fastest)
+            if far and (most > 0 or kind is Kind.ANGLE):
                 yield (
                     f"{recording.names[i]} is {q[k + 1, i]:.4g} {units[i]} in frame {k + 1} alone "
                     f"({t[k + 1]:.3f} s), between {q[k, i]:.4g} and {q[k + 2, i]:.4g}, as where a "
