@@ -472,7 +472,7 @@ def test_a_first_frame_without_a_number_is_no_line_of_names(tmp_path):
     [("t,pan,lift", False), ("# t,pan,lift", False), ("0,1,2", False), ("t,pan,lift", True)],
 )
 def test_a_head_that_comes_again_within_a_motion_is_refused(tmp_path, head, column):
-    rows = [f"{k / 10},{k / 4},{-k / 2}" for k in range(9)]
+    rows = [f"{k / 10},{5 + k / 4},{-k / 2}" for k in range(9)]
     lines = [head, *rows[:3], head, *rows]
     if column:
         lines = [f"{line},{'trial' if line == head else 7}" for line in lines]
@@ -508,3 +508,12 @@ def test_columns_that_pandas_numbers_are_called_by_their_places(tmp_path, index)
     pd.DataFrame(q, index=pd.Index(t, name="t")).to_csv(tmp_path / "a.csv")
     (read,) = read_recordings(tmp_path)
     assert (read.clock, read.named) == ("t in s", False)
+
+
+def test_an_episode_column_counts_beside_columns_that_pandas_numbered(tmp_path):
+    q = np.sin(np.arange(60)[:, None] / [9, 8, 7])
+    frame = pd.DataFrame(q)
+    frame.insert(0, "episode", np.repeat([3, 4], 30))
+    frame.to_csv(tmp_path / "a.csv", index=False)
+    read = read_recordings(tmp_path / "a.csv", rate=50)
+    assert [(one.episode, one.positions.shape) for one in read] == [("3", (30, 3)), ("4", (30, 3))]

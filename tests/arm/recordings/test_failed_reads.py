@@ -75,3 +75,8 @@ def test_a_cusp_no_larger_than_a_step_beside_it_is_not_remarked():
     t, q = sampled(1, 100)
     q[:, 3] = np.pi - np.abs(0.005 + 0.03 * (np.arange(len(t)) - 90)) / (1 + 0.01 * t)
     assert not about(remarks(t, q))
+
+
+def test_a_recording_of_three_frames_is_read():
+    t, q = sampled(1, 50)
+    remarks(t[:3], np.where(np.arange(3)[:, None] == 1, 1.0, q[:3]))

@@ -270,3 +270,36 @@ def test_an_array_a_joint_is_found_by_its_path(tmp_path):
     (read,) = read_recordings(tmp_path / "a.h5", joints=JOINTS)
     np.testing.assert_allclose(read.positions, q)
     np.testing.assert_allclose(read.times, t)
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("frame", 2 * np.arange(61)),
+        ("sim_step", 25 * np.arange(61)),
+        ("progress", np.linspace(0, 1, 61)),
+        ("opening", np.linspace(0, 0.04, 61)),
+        ("travelled", 0.7 * np.linspace(0, 3, 61)),
+    ],
+)
+def test_what_rises_and_is_no_clock_contradicts_no_rate(tmp_path, name, values):
+    with h5py.File(tmp_path / "0.h5", "w") as file:
+        file["q"], file[name] = np.sin(np.arange(61)[:, None] / [9, 8]), values
+    (read,) = read_recordings(tmp_path, key="q", rate=20)
+    assert (len(read.times), read.period) == (61, pytest.approx(0.05))
+
+
+def test_no_time_is_guessed_where_two_may_be_it(tmp_path):
+    with h5py.File(tmp_path / "0.h5", "w") as file:
+        file["q"] = np.sin(np.arange(61)[:, None] / [9, 8])
+        file["progress"] = np.linspace(0, 1, 61)
+        file["stamps"] = 0.05 * np.arange(61)
+    with pytest.raises(FileFormatError, match="neither times nor a rate"):
+        read_recordings(tmp_path, key="q")
+
+
+def test_one_frame_is_no_motion_on_its_side(tmp_path):
+    with h5py.File(tmp_path / "0.h5", "w") as file:
+        file["q"] = np.ones((1, 7))
+    with pytest.raises(InvalidDemonstrationsError, match="T >= 2"):
+        read_recordings(tmp_path, key="q", rate=20)

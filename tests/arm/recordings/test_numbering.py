@@ -65,3 +65,20 @@ def test_some_of_the_episodes_are_numbered_as_all_are():
     assert telling_word("throw", there[1:2], there, "123") == ""
     again = ["throw1_take1", "throw1_take2", "throw2_take1"]
     assert telling_word("throw", again[1:], again, "12") == "throw"
+
+
+def test_a_time_of_day_is_no_number_behind_a_word():
+    assert number_of("throw_2024-05-03_01-02-03_2", "throw") == "2"
+    assert number_of("throw_20240503_140203_take5", "throw") == "5"
+
+
+def test_rows_of_other_sources_do_not_hide_that_two_numbers_fit():
+    names = ["throw_3_take1", "throw_4_take2"]
+    with pytest.raises(InvalidDemonstrationsError, match="throw_3_take1 may be row 3 or row 1"):
+        telling_word("episode", names, names, "12345")
+    assert telling_word("throw", names, names, "12345") == "throw"
+
+
+def test_rows_that_say_the_word_themselves_decide():
+    names = ["throw_1_take2", "throw_2_take1"]
+    assert telling_word("episode", names, names, ["throw_1", "throw_2"]) == "throw"

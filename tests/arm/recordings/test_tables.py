@@ -284,3 +284,22 @@ def test_nul_bytes_elsewhere_are_called_so(tmp_path):
     (tmp_path / "a.csv").write_bytes(b"t,a\n0,1\n1,\0\0\n2,3\n")
     with pytest.raises(FileFormatError, match=r"a\.csv, line 3: NUL bytes.* tr -d '\\0' <"):
         read_table(tmp_path / "a.csv")
+
+
+def test_a_first_row_of_0_and_1_is_refused_where_it_may_be_a_frame(tmp_path):
+    t = np.arange(30) / 50
+    rows = [f"{a:g},{b:.6g}" for a, b in zip(t, np.cos(3 * t), strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join(rows))
+    with pytest.raises(FileFormatError, match="0,1 may be a frame, or numbers of columns"):
+        read_table(tmp_path / "a.csv")
+
+
+def test_utf_16_without_a_mark_is_called_so(tmp_path):
+    (tmp_path / "a.csv").write_bytes("t,q\n0,1\n1,2.5\n".encode("utf-16-le"))
+    with pytest.raises(FileFormatError, match="UTF-16 without a mark"):
+        read_table(tmp_path / "a.csv")
+
+
+def test_unused_room_may_end_in_a_newline(tmp_path):
+    (tmp_path / "a.csv").write_bytes(b"t,q\n0,1\n1,2.5\n" + 40 * b"\0" + b"\n")
+    assert len(read_table(tmp_path / "a.csv")) == 2

@@ -48,6 +48,8 @@ _SHORTEST, LONGEST = 0.1, 60.0
 """Seconds that a throw, slide or swing is recorded for. Ours, and wide on purpose."""
 SAME_RATE = 0.05
 """Rates that differ by a smaller share are one. Ours: clocks of recorders jitter and drift."""
+_NEARLY = 1.25
+"""Times or parts of a rate at which something that rises is a clock of its own. Ours."""
 _APART = 3.0
 """Frames by which two clocks of one recording may differ. Ours: jitter is a frame or two."""
 _LOWEST_RATE, _HIGHEST_RATE = 1e-3, 1e6
@@ -287,8 +289,8 @@ def clock_among(
     """Return times from the arrays of an episode that say they are, held against each other.
 
     `said` are further numbers of the file, a rate perhaps among them. An array that is asked for by
-    name counts more. Where none says it, whatever rises steadily may be the time, but no array of
-    the `motion`: it is asked about, or held against a rate.
+    name counts more. Where none says it, what alone rises steadily may be the time, but no array of
+    the `motion` and no counter: it is asked about, or held against a rate if it nearly is of it.
     """
     asked = options.time_column
     fit = [name for name, array in arrays.items() if array.shape == (count,)]
@@ -304,11 +306,16 @@ def clock_among(
     if not times and others and rated:
         own |= {"stamps": arrays[others[0]], "name": others[0], "unit": FRAME}
     elif not times and not asked and count >= FEWEST_COUNTS:
-        rising = [n for n in fit if n not in motion and rises(arrays[n])]
-        times = [n for n in rising if np.any(np.diff(arrays[n]) != 1)][:1]
-        if times and not rated:
+        free = (n for n in fit if n not in motion and not COUNTER.search(n.lower()))
+        times = [n for n in free if rises(arrays[n]) and np.any(np.diff(arrays[n]) != 1)]
+        if rated:
+            period = 1 / (options.rate or own["own_rate"])
+            times = [n for n in times if _runs_like(arrays[n], period)]
+        elif len(times) == 1:
             what = f"{where} names no times, and {times[0]} looks like the time"
-            guessed.append(Ambiguity(what, f"--time-column {shlex.quote(times[0])}"))
+            option = f"--time-column {shlex.quote(times[0])}"
+            guessed.append(Ambiguity(what, option, guessed=False))
+        times = times if len(times) == 1 else []
     if not times:
         return options.clock(episode, count, **own)
     first, *others = dict.fromkeys([*times, *others])
@@ -317,6 +324,13 @@ def clock_among(
         held = {name: arrays[name].astype(float) for name in others if name in fit}
         hold_together(f"{where}: {episode}", {first: clock.times} | held)
     return replace(clock, ambiguities=(*clock.ambiguities, *guessed))
+
+
+def _runs_like(stamps: Stamps, period: float) -> bool:
+    """Whether a column rises in some unit of time about as fast as frames at a rate come."""
+    own = float(np.median(np.diff(stamps.astype(float))))
+    scales = (scale for unit, scale in SECONDS.items() if unit not in ("min", "h"))
+    return any(1 / _NEARLY < own * scale / period < _NEARLY for scale in scales)
 
 
 def hold_together(where: str, clocks: Mapping[str, Times]) -> None:

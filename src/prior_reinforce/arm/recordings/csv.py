@@ -106,13 +106,13 @@ def _throws(
     whole = [stem] * len(table)
     if options.episode_column == NO_COLUMN:
         return None, whole, ()
-    names = [name.lower() for name in table.names if table.named]
-    column = next((i for i, name in enumerate(names) if name in EPISODE_COLUMNS), None)
+    said = (i for i, name in enumerate(table.names) if name.lower() in EPISODE_COLUMNS)
+    column = next(said, None)
     if options.episode_column is not None:
         column = named_column(table, options.episode_column, "--episode-column")
     if column is not None:
         return column, table.cells[column], ()
-    if not (alone and names):
+    if not (alone and table.named):
         return None, whole, ()
     starts = _starts(table, options)
     for i, cells in enumerate(table.cells):

@@ -29,7 +29,7 @@ def failed_reads(recording: Recording, units: Sequence[str], still: Channels) ->
     in a frame around it. A gripper may be meant to, and a switch, which rests before and after.
     """
     t, q, of = recording.times, recording.positions, np.array(units)
-    if len(t) < 3 or 2 * recording.period > _THERE_AND_BACK:
+    if len(t) < 4 or 2 * recording.period > _THERE_AND_BACK:
         return
     steps, past = np.abs(np.diff(q, axis=0)), q[2:] - q[:-2]
     off = np.abs(q[1:-1] - q[:-2] - ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None] * past)

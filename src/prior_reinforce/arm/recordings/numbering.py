@@ -8,7 +8,10 @@ from collections.abc import Sequence
 from prior_reinforce.errors import InvalidDemonstrationsError
 
 _DATE = r"(?:(?:19|20)\d\d([-_.]?)[01]\d\1[0-3]\d|[0-3]\d([-_.])[01]\d\2(?:19|20)\d\d)"
-_DATED = re.compile(_DATE + r"([T_ .-]?[0-2]\d[-_.:h]?[0-5]\d([-_.:m]?[0-5]\d.*)?)?$")
+_TIME = r"(?:[T_ .-]?[0-2]\d[-_.:h]?[0-5]\d(?:[-_.:m]?[0-5]\d%s)?)?"
+_PART = r"(?:[-_.,]?\d{3,9})?(?:Z|[+-]\d\d:?\d\d)?"
+"""Part of a second, and the time zone."""
+_DATED = re.compile(_DATE + _TIME % _PART + "$")
 """A date, or one with its time of day, at the end of a name."""
 _NUMBER = re.compile(r"([^\W\d_]*)([\W_]*)0*([0-9]+)")
 """A number, and the word or the signs before it."""
@@ -30,7 +33,7 @@ def number_of(name: str, word: str) -> str:
 
 def _numbers(name: str) -> dict[str, str]:
     """Numbers that are no dates, by the word before each, or by the signs if there is none."""
-    found = _NUMBER.findall(re.sub(_DATE, "#", name))
+    found = _NUMBER.findall(re.sub(_DATE + _TIME % "", "#", name))
     return {word.lower() or signs or "#": number for word, signs, number in found}
 
 
@@ -40,7 +43,7 @@ def telling_word(
     """Return the word if rows give the number behind it; empty if they give the one at the end.
 
     The first counts if it tells the `episodes` apart, unless only the other is `there` for all rows
-    that are no whole names.
+    that are no whole names, or for all episodes where rows are of others, too.
 
     Raises:
         InvalidDemonstrationsError: Other numbers are there for all rows, too; the word decides not.
@@ -49,13 +52,15 @@ def telling_word(
     if not wanted or not episodes:
         return ""
     apart, fitting = dict[str, list[str]](), list[str]()
+    of_rows = {*map(tuple, map(_numbers, rows))} - {("#",)}
+    word = next(iter(*of_rows), word) if len(of_rows) == 1 else word  # `throw_1` says throw
     for label in ["", *_numbers(episodes[0])]:
         numbers = [number_of(name, label) for name in episodes]
         every = {number_of(name, label) for name in there}
         shared = not label or all(label in _numbers(name) for name in episodes)
         if shared and len({*numbers} - {""}) == len(episodes) and len(every) >= min(2, len(there)):
             apart[label] = numbers
-            fitting += [label] * (wanted <= every)
+            fitting += [label] * (wanted <= every or {*numbers} <= wanted)
     if word in apart and (word in fitting or "" not in fitting):
         return word
     for label in fitting if "" in fitting else ():

@@ -78,7 +78,7 @@ def recorded_among(
     arrays = {n: a[:kept] if a.shape[:1] == (count,) else a for n, a in arrays.items()}
     positions, known = joined(where, keys, arrays, texts, options.joints)
     bare, units = without_units(names or known)
-    if not bare:
+    if not bare and len(positions) > 1:
         refuse_exchanged(episode, positions)
     said = units_said(texts, bare or ("",) * positions.shape[1])
     units = tuple(a or b for a, b in zip(said, units or (None,) * len(said), strict=False))

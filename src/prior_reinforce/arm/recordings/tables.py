@@ -204,7 +204,9 @@ def _decoded(path: Path) -> str:
             ) from None
     if "\0" in text and re.search(r"[\x01-\x08\x0e-\x19\x1b-\x1f]", text):
         raise FileFormatError(f"{path} is no text; expected a CSV: say its format")
-    text = text.rstrip("\0")  # room that a log did not use
+    text = re.sub(r"\0[\0\s]*$", "", text)  # room that a log did not use
+    if text.count("\0") > len(text) / 3 and "\0\0" not in text:
+        raise FileFormatError(f"{path} is UTF-16 without a mark of it; save it as CSV in UTF-8")
     if "\0" in text:
         raise FileFormatError(
             f"{path}, line {text.split(chr(0))[0].count(chr(10)) + 1}: NUL bytes, as where writing "
@@ -365,9 +367,9 @@ def _numbers_columns(where: str, first: list[str], body: list[list[str]], decima
         return all(says[start:]) and not any(says[:start])
     whole = [any(c.lstrip("+-").isdigit() for c in column) for column in zip(*body, strict=True)]
     steps = np.abs(np.diff([[_number(c, decimal) for c in row] for row in (first, *body)], axis=0))
-    if whole.count(False) > 1 or np.any(steps[0] > 2 * steps[1:].max(axis=0)):
+    if np.any(steps[0] > 2 * steps[1:].max(axis=0)):
         return True
-    if len(first) > 2 and np.any(steps[0] != steps[1]):
+    if whole.count(False) > 1 or (len(first) > 2 and np.any(steps[0] != steps[1])):
         raise FileFormatError(
             f"{where}: {','.join(first)} may be a frame, or numbers of columns as pandas writes "
             "them; put a line of names above it if it is a frame, else in its place"
