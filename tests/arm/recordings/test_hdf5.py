@@ -303,3 +303,11 @@ def test_one_frame_is_no_motion_on_its_side(tmp_path):
         file["q"] = np.ones((1, 7))
     with pytest.raises(InvalidDemonstrationsError, match="T >= 2"):
         read_recordings(tmp_path, key="q", rate=20)
+
+
+def test_a_declared_rate_of_zero_is_named_also_beside_what_rises(tmp_path):
+    with h5py.File(tmp_path / "0.h5", "w") as file:
+        file["q"], file["stamps"] = np.sin(np.arange(61)[:, None] / [9, 8]), 0.05 * np.arange(61)
+        file["q"].attrs["fps"] = 0.0
+    with pytest.raises(FileFormatError, match="fps says 0 frames a second; mend it"):
+        read_recordings(tmp_path, key="q")

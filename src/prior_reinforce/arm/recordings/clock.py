@@ -49,7 +49,7 @@ _SHORTEST, LONGEST = 0.1, 60.0
 SAME_RATE = 0.05
 """Rates that differ by a smaller share are one. Ours: clocks of recorders jitter and drift."""
 _NEARLY = 1.25
-"""Times or parts of a rate at which something that rises is a clock of its own. Ours."""
+"""Factor within which what rises must run as fast as a rate says, to be a clock. Ours."""
 _APART = 3.0
 """Frames by which two clocks of one recording may differ. Ours: jitter is a frame or two."""
 _LOWEST_RATE, _HIGHEST_RATE = 1e-3, 1e6
@@ -289,8 +289,9 @@ def clock_among(
     """Return times from the arrays of an episode that say they are, held against each other.
 
     `said` are further numbers of the file, a rate perhaps among them. An array that is asked for by
-    name counts more. Where none says it, what alone rises steadily may be the time, but no array of
-    the `motion` and no counter: it is asked about, or held against a rate if it nearly is of it.
+    name counts more. Where no name says so, the only array that rises steadily may be the time,
+    unless it is part of the `motion` or counts frames: it is asked about; where a rate is known, it
+    has to agree with it if it runs nearly as fast.
     """
     asked = options.time_column
     fit = [name for name, array in arrays.items() if array.shape == (count,)]
@@ -309,8 +310,8 @@ def clock_among(
         free = (n for n in fit if n not in motion and not COUNTER.search(n.lower()))
         times = [n for n in free if rises(arrays[n]) and np.any(np.diff(arrays[n]) != 1)]
         if rated:
-            period = 1 / (options.rate or own["own_rate"])
-            times = [n for n in times if _runs_like(arrays[n], period)]
+            rate = options.rate or own["own_rate"]
+            times = [n for n in times if _runs_at(rate, arrays[n])]
         elif len(times) == 1:
             what = f"{where} names no times, and {times[0]} looks like the time"
             option = f"--time-column {shlex.quote(times[0])}"
@@ -326,11 +327,11 @@ def clock_among(
     return replace(clock, ambiguities=(*clock.ambiguities, *guessed))
 
 
-def _runs_like(stamps: Stamps, period: float) -> bool:
-    """Whether a column rises in some unit of time about as fast as frames at a rate come."""
-    own = float(np.median(np.diff(stamps.astype(float))))
+def _runs_at(rate: float, stamps: Stamps) -> bool:
+    """Whether a column rises, in some unit of time, about as fast as frames come at a rate."""
+    step = float(np.median(np.diff(stamps.astype(float))))
     scales = (scale for unit, scale in SECONDS.items() if unit not in ("min", "h"))
-    return any(1 / _NEARLY < own * scale / period < _NEARLY for scale in scales)
+    return any(1 / _NEARLY < step * scale * rate < _NEARLY for scale in scales)
 
 
 def hold_together(where: str, clocks: Mapping[str, Times]) -> None:

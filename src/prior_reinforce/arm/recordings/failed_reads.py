@@ -25,8 +25,9 @@ at most so many times or parts. Ours."""
 def failed_reads(recording: Recording, units: Sequence[str], still: Channels) -> Iterator[str]:
     """Say which channels are elsewhere for one frame, and before and after it on their course.
 
-    By more than they may stray while `still`, than a few counts of an encoder, and than they move
-    in a frame around it. A gripper may be meant to, and a switch, which rests before and after.
+    A frame counts if it is farther off than a channel strays at rest (`still`), than a few counts
+    of an encoder, and than the channel moves from frame to frame around it. Grippers are left out,
+    and switches, which rest before and after.
     """
     t, q, of = recording.times, recording.positions, np.array(units)
     if len(t) < 4 or 2 * recording.period > _THERE_AND_BACK:

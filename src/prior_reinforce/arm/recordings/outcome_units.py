@@ -166,8 +166,7 @@ def _refuse_odd_row(outcomes: Outcomes, units: Sequence[str], given: str | None)
         right = ", or confirm them with --outcome-unit m" * stated
     if odd.any():
         episodes = listed(np.array(outcomes.episodes)[odd].tolist())
-        others = number[~odd & (number > 0)]
-        least, most = np.nanmin(others), np.nanmax(others)
+        least, most = np.nanmin(number[~odd]), np.nanmax(number[~odd])
         raise InvalidDemonstrationsError(
             f"in {outcomes.where}, {episodes} is in another unit than the others: "
             f"{min(number[odd]):.4g} beside {least:.4g} to {most:.4g}; write all in one, and name "
