@@ -6,6 +6,7 @@ import pytest
 
 import prior_reinforce as pr
 from prior_reinforce.generators import make_generator
+from reproduction.demonstrations import DRAWN
 from reproduction.evaluation import LearnedGenerator, Training
 from reproduction.recipes import Scale
 from reproduction.recipes.papers_loop import (
@@ -15,6 +16,7 @@ from reproduction.recipes.papers_loop import (
     KNOWN,
     LOOP,
     ONE_NOISE,
+    QUARTER,
     RECIPE,
     SMALLER,
     SPLINES,
@@ -33,11 +35,14 @@ TINY = (
 def test_one_training_a_set_and_code_serves_everything():
     planned = units(Scale(device="cuda"))
     trainings = {unit.training for unit, _ in planned}
-    assert {(t.generator, t.demonstrations) for t in trainings} == {
+    everywhere = {
         (generator, name)
         for generator in (FRAMES, SPLINES, *FEWER.values(), *SMALLER.values())
         for name in ("A", "B")
     }
+    drawn = {(SMALLER[QUARTER], name) for name in DRAWN}
+    assert {(t.generator, t.demonstrations) for t in trainings} == everywhere | drawn
+    assert len(trainings) == len(everywhere | drawn)
     assert {t.perception for t in trainings} == {"camera"}
     assert {t.generator for t in trainings if t.device == "cpu"} == {
         FRAMES + ",network.widths=32:64:128"
@@ -96,8 +101,9 @@ def test_a_row_a_form_and_what_is_known_before_the_gate_in_words():
            "quantity": "own_rms_rad", "value": v} for v in (0.001, 0.003)),
     ]  # fmt: skip
     results = Results(pd.DataFrame(rows), {})
-    (row,) = RECIPE.table(results).rows
+    row, *quarter = RECIPE.table(results).rows
     assert [cell.split()[0] for cell in row[:3]] == ["loop", "2.00", "4.00"]
+    assert [cells[0] for cells in quarter] == [f"{QUARTER}: {LOOP}", f"{QUARTER}: {ONE_NOISE}"]
     known, others, gate = RECIPE.remarks(results)
     assert "; 10,000 steps 7.00, 5.00; " in others
     assert others.endswith("widths 128:256:512 7.00, 5.00.")
