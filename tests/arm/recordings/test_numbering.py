@@ -12,6 +12,8 @@ def test_the_seconds_of_a_time_are_no_number_of_an_episode():
     assert digits_at_end("2024-05-03") == digits_at_end("log_2024-05-03_1402") == ""
     assert digits_at_end("2024-05-03_demo_003") == digits_at_end("2024-05-03_3") == "3"
     assert digits_at_end("throw_03.05.2024") == ""
+    assert digits_at_end("log_10-10-03") == digits_at_end("log_10_10_03.250") == ""
+    assert digits_at_end("2-01-03") == digits_at_end("set-10_11-3") == "3"
 
 
 @pytest.mark.parametrize(
@@ -70,6 +72,7 @@ def test_some_of_the_episodes_are_numbered_as_all_are():
 def test_a_time_of_day_is_no_number_behind_a_word():
     assert number_of("throw_2024-05-03_01-02-03_2", "throw") == "2"
     assert number_of("throw_20240503_140203_take5", "throw") == "5"
+    assert number_of("throw_14-02-03_take5", "throw") == "5"
 
 
 def test_rows_of_other_sources_do_not_hide_that_two_numbers_fit():

@@ -11,8 +11,11 @@ _DATE = r"(?:(?:19|20)\d\d([-_.]?)[01]\d\1[0-3]\d|[0-3]\d([-_.])[01]\d\2(?:19|20
 _TIME = r"(?:[T_ .-]?[0-2]\d[-_.:h]?[0-5]\d(?:[-_.:m]?[0-5]\d%s)?)?"
 _PART = r"(?:[-_.,]?\d{3,9})?(?:Z|[+-]\d\d:?\d\d)?"
 """Part of a second, and the time zone."""
-_DATED = re.compile(_DATE + _TIME % _PART + "$")
-"""A date, or one with its time of day, at the end of a name."""
+_PAIRS = r"(?<!\d)[0-3]\d(?P<sign>[-_.:])[0-5]\d(?P=sign)[0-5]\d%s(?!\d)"
+"""A time of day, or a date with a short year: three pairs of digits."""
+_DATED = re.compile(f"(?:{_DATE}{_TIME % _PART}|{_PAIRS % _PART})$")
+"""A date, one with its time of day, or that alone, at the end of a name."""
+_DATES = re.compile(f"{_DATE}{_TIME % ''}|{_PAIRS % ''}")
 _NUMBER = re.compile(r"([^\W\d_]*)([\W_]*)0*([0-9]+)")
 """A number, and the word or the signs before it."""
 
@@ -20,7 +23,7 @@ _NUMBER = re.compile(r"([^\W\d_]*)([\W_]*)0*([0-9]+)")
 def digits_at_end(name: str) -> str:
     """Return the number at the end of a name, without leading zeros; empty if there is none.
 
-    The last digits of a time, `2024-05-03_14-02-03`, are no number of an episode.
+    The last digits of a time, `2024-05-03_14-02-03` or `14-02-03`, are no number of an episode.
     """
     match = re.search(r"0*([0-9]+)$", name)
     return match[1] if match and not _DATED.search(name) else ""
@@ -33,7 +36,7 @@ def number_of(name: str, word: str) -> str:
 
 def _numbers(name: str) -> dict[str, str]:
     """Numbers that are no dates, by the word before each, or by the signs if there is none."""
-    found = _NUMBER.findall(re.sub(_DATE + _TIME % "", "#", name))
+    found = _NUMBER.findall(_DATES.sub("#", name))
     return {word.lower() or signs or "#": number for word, signs, number in found}
 
 
