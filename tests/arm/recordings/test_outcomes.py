@@ -272,6 +272,14 @@ def test_rows_that_are_numbered_otherwise_are_not_taken_for_their_neighbours(
         import_demonstrations(recording, outcomes=path)
 
 
+@pytest.mark.parametrize("there", [["0", "2", "3", "5"], [f"log_10-1{i}-0{i}" for i in range(4)]])
+def test_a_table_that_counts_the_recordings_is_to_name_them(tmp_path, there):
+    found = read_outcomes(table(tmp_path, "episode,x,y\n0,1,0\n1,1,0\n2,1,0\n3,1,0\n"))
+    says = rf"\); the table seems to count the 4 recordings .* \(3 is {there[-1]}\); else correct"
+    with pytest.raises(InvalidDemonstrationsError, match=says):
+        check_rows(found, there, there)
+
+
 def test_some_episodes_may_be_asked_for_with_a_table_of_more(recording, tmp_path):
     path = table(tmp_path, "\n".join(["episode,x,y", *rows_of_outcomes(), "17,1,0"]))
     assert import_demonstrations(recording, outcomes=path, episodes=["0", "3"]).episodes == (

@@ -360,10 +360,20 @@ def check_rows(
 
 
 def _renumber(episodes: Sequence[str], outcomes: Outcomes) -> str:
-    """What to do where rows may be numbered from another number than the episodes; else empty."""
+    """What to do where rows may be numbered otherwise than the episodes; else empty."""
     ours = [number_of(name, outcomes.word) for name in episodes]
     theirs = [digits_at_end(name) for name in outcomes.episodes]
-    if not (all(ours) and all(theirs) and ours and theirs) or len({*ours}) < len(ours):
+    if not (all(theirs) and ours and theirs):
+        return ""
+    unlike = not all(ours) or min(map(int, ours)) == min(map(int, theirs))
+    rows = sorted(map(int, theirs))
+    if unlike and rows in ([*range(len(ours))], [*range(1, len(ours) + 1)]):
+        name = episodes[-1]
+        return (
+            f"the table seems to count the {len(ours)} recordings in their order: if it does, call "
+            f"its rows by their names ({rows[-1]} is {name}); else "
+        )
+    if not all(ours) or len({*ours}) < len(ours):
         return ""
     first, of_table = min(map(int, ours)), min(map(int, theirs))
     if first == of_table or len(theirs) > len(ours):
