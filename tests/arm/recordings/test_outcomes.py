@@ -106,6 +106,8 @@ def test_numbers_that_two_names_share_match_nothing(recording, tmp_path):
         ("a,b\n1,2\n", "expected column names"),
         ("episode\n1\n", "expected column names"),
         ("episode,x,x\n1,2,3\n", "expected column names"),
+        ("order,x,y\n1,2,3\n", "none of these names the recordings; .* episode"),
+        ("episode,x_cm,y_cm,x_m\n1,2,3,4\n", ": x_cm and x_m are all x; keep one"),
         ("episode,x,y\n1,2\n", "line 2: y is '', expected a finite number"),
         ("episode,x,y\n1,2,3\n1,2,4\n", "line 3: episode 1 again"),
         ("episode,x,y\n1,5cm,3\n", "line 2: x is '5cm', expected a finite number"),
@@ -336,6 +338,22 @@ def test_a_distance_and_a_bearing_are_said_to_be_no_x_and_y(recording, tmp_path)
     path = table(tmp_path, "episode,r,angle\n0,0.9,7\n")
     with pytest.raises(InvalidDemonstrationsError, match="x = r cos b"):
         import_demonstrations(recording, outcomes=path, outcome_names=("x", "y"))
+
+
+@pytest.mark.parametrize(
+    ("names", "says"),
+    [
+        ("error_x_cm,error_y_cm", "error_x, error_y may be measured from a target, .* as x, y "),
+        ("dx,dy", "dx, dy may be measured from a target, and outcomes are places"),
+        ("X_cm,Z_cm", "Z is no y; add it, and turn what a camera saw in its own axes"),
+        ("length,width", "rename or add it"),
+    ],
+)
+def test_what_is_no_place_is_not_to_be_renamed(tmp_path, names, says):
+    found = read_outcomes(table(tmp_path, f"take,{names}\n0,0.9,7\n"), ["x", "y"])
+    assert found.word == "take"
+    with pytest.raises(InvalidDemonstrationsError, match=says):
+        found.only(["x", "y"])
 
 
 def test_left_and_right_at_once_are_refused(recording, tmp_path):

@@ -20,6 +20,7 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.arm.recordings.numbering import digits_at_end, number_of, telling_word
+from prior_reinforce.arm.recordings.outcome_columns import columns_of, remedy_for
 from prior_reinforce.arm.recordings.recording import EPISODE_COLUMNS
 from prior_reinforce.arm.recordings.tables import Table, read_table
 from prior_reinforce.arm.recordings.units import (
@@ -34,7 +35,6 @@ from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError
 from prior_reinforce.files import as_cell, from_cell, named_disk_errors, write
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.units import base_of
-from prior_reinforce.wording import PLACE_WORDS, axes_of
 
 OUTCOMES_FILE = "outcomes.csv"
 SD = "sd"
@@ -52,9 +52,9 @@ _FILE = re.compile(
 """Path of a recording, or of what was filmed beside it, by which a row may call its episode."""
 _UNCERTAINTY = re.compile(r"(.*[^a-z])?(sd|std|stdev|sigma|stderr|uncertainty)([^a-z].*)?|.*±.*")
 _SEMICOLONS = "semicolons, where a comma is the decimal sign"
-_RADII = ("r", "radius", "distance", "dist", "range")
-_BEARINGS = ("angle", "bearing", "azimuth", "theta", "phi", "heading", "direction")
 SOURCE = "source"
+ROW_COLUMNS = (*EPISODE_COLUMNS, "take")
+"""Names of a column that says of which recording a row is."""
 _NOT_COMPONENTS = (SD, SOURCE, "note", "notes", "comment", "comments")
 
 
@@ -98,7 +98,7 @@ class Outcomes:
         Raises:
             InvalidDemonstrationsError: One is missing.
         """
-        columns = _columns_of(names, self.names)
+        columns = columns_of(names, self.names)
         missing = [name for name, found in columns.items() if not found]
         for name, found in columns.items():
             if len(found) > 1:
@@ -107,13 +107,9 @@ class Outcomes:
                     f"write one column {name}"
                 )
         if missing:
-            polar = ""
-            if {*_RADII}.intersection(self.names) and {*_BEARINGS}.intersection(self.names):
-                polar = "; of a distance r and a bearing b to the left, x = r cos b and y = r sin b"
             raise InvalidDemonstrationsError(
                 f"{self.where} has no column {', '.join(missing)}; it has "
-                f"{', '.join(self.names)}: rename or add it (x is ahead of the base, y to its left"
-                f"{polar})"
+                f"{', '.join(self.names)}: {remedy_for(missing, self.names)}"
             )
         at, signs = zip(*(found[0] for found in columns.values()), strict=True)
         said = [
@@ -145,17 +141,6 @@ class Outcomes:
         names = tuple(map(str, range(1, k + 1)))
         none, scale = (None,) * k, (1.0,) * k
         return cls(where, (*numbers,), values, np.zeros(n), names, none, named=False, scale=scale)
-
-
-def _columns_of(names: Sequence[str], there: Sequence[str]) -> dict[str, list[tuple[int, int]]]:
-    """Columns that each component may be, with signs: by its name, or by where it counts up to."""
-    axes = axes_of(OutcomeFormat(tuple(names), ("m",) * len(names)))
-    found = {}
-    for name, axis in zip(names, axes, strict=True):
-        words = PLACE_WORDS[axis] if axis < len(PLACE_WORDS) else ()
-        signs = {name.lower(): 1} | dict(zip(words, (1, -1), strict=False))
-        found[name] = [(i, signs[n.lower()]) for i, n in enumerate(there) if n.lower() in signs]
-    return found
 
 
 def table_beside(places: Sequence[Path]) -> Path | None:
@@ -209,18 +194,18 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
     example = "episode,x,y"
     if not path.is_file():
         raise FileFormatError(f"no table at {path}; give the path of a table {example}")
-    table = read_table(path, head=EPISODE_COLUMNS)
+    table = read_table(path, head=ROW_COLUMNS)
     split = [split_unit(name) for name in table.names]
     # `distance_in` is in inches where there is a `distance`; elsewhere `plug_in` is no length.
     wanted = {f"{name}_in": (name, "in") for name in names or ()}
     split = [wanted.get(name, (name, unit)) for name, unit in split]
     lower = [name.lower() for name, _ in split]
-    key = next((i for i, name in enumerate(lower) if name in EPISODE_COLUMNS), None)
+    key = next((i for i, name in enumerate(lower) if name in ROW_COLUMNS), None)
     if key is None and table.named and lower[0] not in _NOT_COMPONENTS and table.is_text(0):
         key = 0  # by its cells, whatever it is called
-    other = (*_NOT_COMPONENTS, *EPISODE_COLUMNS)
+    other = (*_NOT_COMPONENTS, *ROW_COLUMNS)
     columns = [i for i, name in enumerate(lower) if i != key and name not in other]
-    meant = _columns_of(names or (), [split[i][0] for i in columns])
+    meant = columns_of(names or (), [split[i][0] for i in columns])
     if meant and all(meant.values()):  # others may hold anything
         own = {i for each in meant.values() for i, _ in each}
         exact = {i for i in own if split[columns[i]][0] in meant}
@@ -236,10 +221,15 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
             f"{path} says uncertainties in {', '.join(spreads)}, but a row has one, in a column "
             f"{SD}: write the largest of each row there, and take the others out"
         )
-    if key is None or not columns or len(set(kept)) != len(kept):
+    twice = next((own for own in kept if kept.count(own) > 1), None)
+    if key is None or not columns or twice:
+        both = [table.names[i] for i, own in zip(columns, kept, strict=True) if own == twice]
+        why = f": {' and '.join(both)} are all {twice}; keep one" * bool(both)
+        if key is None and table.named:
+            why = ": none of these names the recordings; call the one that does so episode"
         raise FileFormatError(
             f"{path} begins with {','.join(table.names)!r:.200}, expected column names such as "
-            f"{example}"
+            f"{example}{why}"
         )
     units = [table.units[i] or split[i][1] for i in columns]
     _doubt_thousands(path, table, dict(zip(columns, units, strict=True)))
