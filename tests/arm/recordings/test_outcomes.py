@@ -19,6 +19,7 @@ from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
     InvalidDemonstrationsError,
+    UnclearUnitsError,
 )
 from prior_reinforce.formats import OutcomeFormat
 from tests.arm.recordings.recorded import (
@@ -141,6 +142,22 @@ def test_only_a_table_that_stands_beside_the_recordings_is_taken(tmp_path):
     )
     named = import_demonstrations(folder, outcomes=tmp_path / "outcomes.csv")
     assert f"from {tmp_path}/outcomes.csv" in named.preview.text
+
+
+@pytest.mark.parametrize("column", ["episode", "file"])
+def test_a_table_among_the_recordings_is_no_recording(tmp_path, column):
+    for i in range(2):
+        rows = [f"{k / 10},{np.sin(k / 4 + i)}" for k in range(20)]
+        (tmp_path / f"throw_{i}.csv").write_text("\n".join(["t,joint1", *rows]))
+    path = tmp_path / "results.csv"
+    path.write_text(f"{column},x,y\nthrow_0,0.8,0.1\nthrow_1,0.9,-0.1\n")
+    with pytest.raises(UnclearUnitsError, match=r"results\.csv has a row for each") as caught:
+        import_demonstrations(tmp_path)
+    assert caught.value.options == f"--outcomes {path}"
+    result = import_demonstrations(tmp_path, outcomes=path)
+    assert result.episodes == ("throw_0", "throw_1")
+    path.rename(tmp_path / "Outcomes.CSV")
+    assert import_demonstrations(tmp_path).episodes == result.episodes
 
 
 def test_a_table_to_fill_in_has_the_episodes_names_and_the_units(tmp_path):

@@ -226,7 +226,7 @@ class Imports:
     def _read(self) -> _Found:
         if not self._folder.is_dir():
             raise InvalidDemonstrationsError("no recordings are here yet; drop some on the page")
-        there = [path for path in self._folder.iterdir() if path.name != OUTCOMES_FILE]
+        there = [path for path in self._folder.iterdir() if path.name.lower() != OUTCOMES_FILE]
         # A folder that was dropped alone is the recordings.
         source = there[0] if len(there) == 1 and there[0].is_dir() else self._folder
         wanted = self._workspace.wanted()

@@ -6,6 +6,7 @@ channels. Logs of libfranka and of RTDE are known by their columns.
 
 from __future__ import annotations
 
+import contextlib
 import shlex
 from collections.abc import Sequence
 from functools import partial
@@ -22,6 +23,7 @@ from prior_reinforce.arm.recordings.naming import find_channels, numbered_like, 
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     EPISODE_COLUMNS,
+    ROW_COLUMNS,
     Episodes,
     Recording,
     files_at,
@@ -74,11 +76,15 @@ LOG_FORMATS = (
 def read(source: Path, options: ReadOptions) -> Episodes:
     """Read a CSV file, or every CSV file of a folder."""
     paths = files_at(source, SUFFIXES) or files_at(source, (*SUFFIXES, *IN_TEXT))
+    stems = [path.stem for path in paths]
     for path in paths:
         if len(paths) > 1 and path.stem in (options.leave_out or ()):
             yield path.stem, unread
             continue
-        table = headed(read_table(path, options.delimiter, options.decimal), options.joints)
+        table = read_table(path, options.delimiter, options.decimal)
+        if len(paths) > 1 and _has_a_row_each(table, stems):
+            continue
+        table = headed(table, options.joints)
         table = with_whole_dates(with_heads(table))
         said = said_above(path)
         if not table.names or len(table) < 2:
@@ -93,6 +99,32 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         for episode in sorted({*names} - {""} or {""}, key=natural_order):
             own = table.rows([i for i, name in enumerate(names) if name == episode])
             yield episode, partial(_episode, own, episode, options, column, guessed, said, remarks)
+
+
+def table_of_outcomes(
+    source: Path, there: Sequence[str]
+) -> tuple[Path | None, tuple[Ambiguity, ...]]:
+    """Return the file among recordings that looks like their table of outcomes, and this doubt."""
+    paths = files_at(source, SUFFIXES) if source.is_dir() else []
+    paths = [path for path in paths if path.stem not in there]
+    found = []
+    for path in paths:
+        with contextlib.suppress(FileFormatError):  # beside recordings of another format
+            found += [path] * _has_a_row_each(read_table(path), there)
+    if len(found) != 1:
+        return None, ()
+    what = f"{found[0]} has a row for each recording: it looks like the table of outcomes"
+    return found[0], (Ambiguity(what, shlex.join(["--outcomes", str(found[0])])),)
+
+
+def _has_a_row_each(table: Table, episodes: Sequence[str]) -> bool:
+    """Whether each row is of another episode, as in a table of outcomes."""
+    lower = [name.lower() for name in table.names]
+    key = next((i for i, name in enumerate(lower) if name in ROW_COLUMNS), None)
+    if key is None and table.named and table.is_text(0):
+        called = {Path(cell).stem for cell in table.cells[0]}
+        key = 0 if called.intersection(episodes) else None
+    return key is not None and len(table) == len({*table.cells[key]}) > 1
 
 
 def _throws(

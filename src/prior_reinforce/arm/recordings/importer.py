@@ -280,6 +280,9 @@ class Recordings:
             UnclearUnitsError: The same, where something is unclear.
             FileFormatError: The table is missing or damaged.
         """
+        guessed: tuple[Ambiguity, ...] = ()
+        if given is None and table_beside(self.outcome_places) is None:
+            given, guessed = csv.table_of_outcomes(self.source, self.there)
         try:
             found = self._outcomes(given, wanted.outcome_names, may_lack=may_lack)
         except InvalidDemonstrationsError as missing:
@@ -287,7 +290,8 @@ class Recordings:
             raise
         if isinstance(given, Mapping):
             return found, ()
-        return in_units(found, wanted.outcome_units, unit)
+        found, more = in_units(found, wanted.outcome_units, unit)
+        return found, guessed + more
 
     def _outcomes(
         self,

@@ -21,7 +21,7 @@ from jaxtyping import Float
 
 from prior_reinforce.arm.recordings.numbering import digits_at_end, number_of, telling_word
 from prior_reinforce.arm.recordings.outcome_columns import columns_of, remedy_for
-from prior_reinforce.arm.recordings.recording import EPISODE_COLUMNS
+from prior_reinforce.arm.recordings.recording import ROW_COLUMNS
 from prior_reinforce.arm.recordings.tables import Table, read_table
 from prior_reinforce.arm.recordings.units import (
     CHANNEL_UNITS,
@@ -53,8 +53,6 @@ _FILE = re.compile(
 _UNCERTAINTY = re.compile(r"(.*[^a-z])?(sd|std|stdev|sigma|stderr|uncertainty)([^a-z].*)?|.*±.*")
 _SEMICOLONS = "semicolons, where a comma is the decimal sign"
 SOURCE = "source"
-ROW_COLUMNS = (*EPISODE_COLUMNS, "take")
-"""Names of a column that says of which recording a row is."""
 _NOT_COMPONENTS = (SD, SOURCE, "note", "notes", "comment", "comments")
 
 
@@ -145,7 +143,9 @@ class Outcomes:
 
 def table_beside(places: Sequence[Path]) -> Path | None:
     """Return the table of outcomes in one of the folders; None if there is none."""
-    return next((f / OUTCOMES_FILE for f in places if (f / OUTCOMES_FILE).is_file()), None)
+    files = (path for folder in places if folder.is_dir() for path in folder.iterdir())
+    found = (f for f in files if f.name.lower() == OUTCOMES_FILE and f.is_file())
+    return min(found, key=lambda path: path.name != OUTCOMES_FILE, default=None)
 
 
 def write_outcome_table(

@@ -45,6 +45,8 @@ EPISODE_COLUMNS = tuple(
     for ending in ("", "_id", "_index", "_number")
 )
 """Names of a column that says of which episode a row is."""
+ROW_COLUMNS = (*EPISODE_COLUMNS, "take")
+"""The same in a table with a row a recording."""
 
 
 class Beside(NamedTuple):
@@ -271,7 +273,9 @@ def files_at(source: Path, suffixes: tuple[str, ...]) -> list[Path]:
     if not source.is_dir():
         return [source]
     files = [path for path in source.iterdir() if path.is_file() and not is_hidden(path)]
-    found = [path for path in files if has_suffix(path, suffixes) and path.stem != "outcomes"]
+    found = [
+        path for path in files if has_suffix(path, suffixes) and path.stem.lower() != "outcomes"
+    ]
     return sorted(found, key=natural_order)
 
 
