@@ -40,6 +40,20 @@ def test_what_is_lost_in_a_channel_that_is_not_taken_does_not_count():
     assert selection.left_out == ""
 
 
+@pytest.mark.parametrize("zero", ["joint0", "rail0"])
+def test_a_joint_before_the_first_that_moves_is_asked_about(zero):
+    q = np.column_stack([np.sin(T), np.cos(T), np.sin(2 * T)])
+    names = ["joint1", "joint2"]
+    takes = [Recording("throw", T, q, (zero, *names))]
+    asked = [one.what for one in select(takes, names, names).ambiguities]
+    assert ["give --joints joint0 joint1; or" in what for what in asked] == [True] * (
+        zero[0] == "j"
+    )
+    assert select(takes, [zero, "joint1"], names).ambiguities == ()
+    still = [Recording("throw", T, q * [0, 1, 1], (zero, *names))]
+    assert select(still, names, names).ambiguities == ()
+
+
 def test_a_lost_frame_makes_no_angle_of_a_gripper_in_shares():
     q = np.column_stack([np.sin(T), 0.5 + 0.5 * np.sin(T)])
     q[10, 1] = np.nan

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +20,13 @@ from prior_reinforce.arm.recordings.naming import (
 )
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.takes import in_one_unit, odd_takes
-from prior_reinforce.arm.recordings.units import Ambiguity, conversion, listed, say_names
+from prior_reinforce.arm.recordings.units import (
+    Ambiguity,
+    conversion,
+    listed,
+    say_names,
+    split_unit,
+)
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.plans.whole_turns import TURN
 
@@ -126,7 +133,10 @@ def select(
         questions = [*unsaid, *differ, *questions]
     recorded, wanted = judge.recorded(), tuple(belief.wanted for belief in beliefs)
     scale = [conversion(*each) for each in zip(recorded, wanted, names, strict=True)]
-    left_out = [f"{n}, {low:.4g} to {high:.4g}" for n, (low, high) in moving_beside(picked).items()]
+    moving = moving_beside(picked)
+    left_out = [f"{n}, {low:.4g} to {high:.4g}" for n, (low, high) in moving.items()]
+    if unnamed and not guessed and recordings[0].named:
+        guessed = _doubt_first(picked[0].columns, [split_unit(name)[0] for name in moving])
     return Selection(
         tuple(replace(r, positions=r.positions * scale, units=wanted) for r in takes),
         names,
@@ -185,6 +195,21 @@ def _guess_names(
         return joints, ()
     what = f"no column is called {say_names(joints)}: it looks as if {say_names(found)} were these"
     return found, (Ambiguity(what, f"--joints {shlex.join(found)}"),)
+
+
+def _doubt_first(columns: Sequence[str], moving: Sequence[str]) -> tuple[Ambiguity, ...]:
+    """Ask of `joint1`, `joint2` whether they are the plan's where a `joint0` moves beside them."""
+    first = re.fullmatch(r"(.*\D|)1(\D*)", columns[0])
+    if first is None or len(columns) < 2:
+        return ()
+    zero, *others = (f"{first[1]}{i}{first[2]}" for i in range(len(columns) + 1))
+    if others != [*columns] or zero not in moving:
+        return ()
+    what = (
+        f"{zero} moves beside {say_names(columns)}: if the recorder counts from 0, give --joints "
+        f"{shlex.join([zero, *columns[:-1]])}; or the names are the plan's, from 1"
+    )
+    return (Ambiguity(what, f"--joints {shlex.join(columns)}"),)
 
 
 def _columns(
