@@ -24,6 +24,10 @@ def about(said):
     return [one for one in said if "a read failed" in one or "in mid-motion" in one]
 
 
+def in_steps(said):
+    return [one for one in said if "they move in steps" in one]
+
+
 @pytest.mark.parametrize("value", [0.0, -1.5, 7.0])
 @pytest.mark.parametrize("sigma", [0.0, 1e-3])
 def test_one_frame_of_one_joint_off_its_course_is_remarked(value, sigma):
@@ -47,6 +51,26 @@ def test_one_frame_again_and_again_in_mid_motion_is_remarked(rate, frames):
         f"7: nothing recorded in mid-motion for {frames / rate:.3f} s at {t[first]:.2f} s: one "
         "frame again and again"
     )
+
+
+@pytest.mark.parametrize(("rate", "own"), [(500, 50), (500, 30), (100, 50), (200, 60), (1000, 125)])
+def test_poses_that_are_held_on_a_faster_clock_are_remarked(rate, own):
+    t, q = sampled(1, rate)
+    frame = np.floor(np.arange(len(t)) * own / rate + 1e-9).astype(int)
+    held = q[np.unique(frame, return_index=True)[1][frame]]
+    (said,) = in_steps(remarks(t, held))
+    assert float(said.split()[4]) == pytest.approx(own, rel=0.1)
+    assert f"times a second in frames at {rate} Hz, held in between" in said
+    new = np.append(True, np.any(np.diff(held, axis=0) != 0, axis=1))
+    assert not in_steps(remarks(t[new], held[new]))
+
+
+@pytest.mark.parametrize("rate", [20, 100, 500])
+def test_poses_that_are_rounded_are_not_remarked_as_held(rate):
+    t, q = sampled(1, rate)
+    for decimals in (1, 2, 3, 4):
+        assert not in_steps(remarks(t, np.round(q, decimals)))
+        assert not in_steps(remarks(t, np.round(q[:, :1], decimals), JOINTS[:1]))
 
 
 @pytest.mark.parametrize("rate", [15, 20, 30, 100, 500])

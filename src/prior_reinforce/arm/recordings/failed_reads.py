@@ -20,6 +20,8 @@ _WAITS = 3.0
 _LEAP, _ALIKE = 2.0, 3.0
 """Across a stall a channel moves by so many times its steps before and after, and about as fast: by
 at most so many times or parts. Ours."""
+_MOST, _FEWEST_VALUES = 0.9, 12
+"""Values that are held for about one number of frames, of at least so many. Ours."""
 
 
 def failed_reads(recording: Recording, units: Sequence[str], still: Channels) -> Iterator[str]:
@@ -49,6 +51,24 @@ def failed_reads(recording: Recording, units: Sequence[str], still: Channels) ->
                     f"({t[k + 1]:.3f} s), between {q[k, i]:.4g} and {q[k + 2, i]:.4g}, as where a "
                     "read failed: write their middle there, or leave that episode out (--leave-out)"
                 )
+
+
+def held_frames(recording: Recording) -> float | None:
+    """Return for how many frames each pose is held while the arm moves, None if for one.
+
+    What is rounded is held too, but moves by its counts; grippers may move by themselves.
+    """
+    arm = [kind is not Kind.TOOL for kind in kinds(recording.names)]
+    steps = np.abs(np.diff(recording.positions[:, arm], axis=0))
+    new = np.flatnonzero(np.any(steps > 0, axis=1))
+    if len(new) < _FEWEST_VALUES:
+        return None
+    counts = np.min(steps, axis=0, where=steps > 0, initial=np.inf)
+    held, leaps = np.diff(new), np.max(steps[new] / counts, axis=1)
+    usual = float(np.median(held))
+    alike = np.abs(held - usual) <= max(1.0, usual / 4)
+    regular = usual > 1 and np.mean(alike) > _MOST and np.median(leaps) > _LEAP
+    return float(np.mean(held[alike])) if regular else None
 
 
 def stalls(recording: Recording) -> Iterator[tuple[float, float]]:

@@ -14,7 +14,7 @@ from jaxtyping import Float
 from msgspec import Meta
 
 from prior_reinforce.arm.recordings.clock import LONGEST
-from prior_reinforce.arm.recordings.failed_reads import failed_reads, stalls
+from prior_reinforce.arm.recordings.failed_reads import failed_reads, held_frames, stalls
 from prior_reinforce.arm.recordings.leaps import refuse_leaps
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.units import say_names
@@ -238,6 +238,14 @@ def _remarks(
     for start, wait in stalls(recording):
         what = "nothing recorded in mid-motion for"
         yield _Kind.GAP, f"{what} {wait:.3f} s at {start:.2f} s: one frame again and again"
+    if frames := held_frames(recording):
+        rate = 1 / recording.period
+        yield (
+            _Kind.GAP,
+            f"the joints change {rate / frames:.3g} times a second in frames at {rate:.4g} Hz, "
+            "held in between, so they move in steps: record them at that rate, or write the "
+            "frames alone in which they change",
+        )
     for remark in failed_reads(recording, units, signals.trim_band):
         yield _Kind.FAILED, remark
     if jumping:
