@@ -51,6 +51,18 @@ def test_what_cannot_be_used_is_named_with_its_episode_and_frame(times, position
         Recording("a", times, positions)
 
 
+def test_times_that_fall_while_the_joints_go_on_are_wrong_and_no_order():
+    q = np.linspace(0, 1, 40)[:, None]
+    lacking = [float(f"1.{8_000_000 * i}") for i in range(40)]  # seconds, point, nanoseconds
+    with pytest.raises(
+        InvalidDemonstrationsError, match=r"frame 2 .*lack their zeros.* none --rate"
+    ):
+        Recording("a", lacking, q)
+    order = np.random.default_rng(0).permutation(40)
+    with pytest.raises(InvalidDemonstrationsError, match="; sort frames"):
+        Recording("a", order / 100, q[order])
+
+
 def test_ten_follows_nine():
     assert sorted(["d10", "d9", "d", "c11"], key=natural_order) == ["c11", "d", "d9", "d10"]
 

@@ -37,6 +37,8 @@ _LARGEST_POINTER, _MOST_FILES = 1024, 5_000
 """Bytes of a Git LFS pointer (its specification), and files that are looked through for one."""
 _WIDER = 5
 """Times as many columns without names as frames that no motion has. Ours."""
+_DETOUR = 1.5
+"""Times as far as a motion goes if its frames are put out of order. Ours."""
 _LEAP = 3.0
 """Steps of a motion, as large as its largest, that make a leap. Ours."""
 EPISODE_COLUMNS = tuple(
@@ -146,9 +148,13 @@ class Recording:
             frame = int(np.argmax(np.diff(times) <= 0)) + 1
             remedy = "sort frames that are out of order; if the clock was set back, leave that "
             remedy += "episode out"
+            at_rate = "read the frames at their known rate with --time-column none --rate HZ"
             if np.all(np.diff(times) >= 0):
-                remedy = "it repeats, as of a coarse clock: read the frames at their known rate "
-                remedy += "with --time-column none --rate HZ, or by another --time-column"
+                remedy = f"it repeats, as of a coarse clock: {at_rate}, or by another --time-column"
+            elif _way(positions[np.argsort(times)]) > _DETOUR * _way(positions):
+                remedy = "the joints go on as if the frames were in order, so it is the times that "
+                remedy += "are wrong, as where a clock was set back, or nanoseconds behind a point "
+                remedy += f"lack their zeros: {at_rate}, or leave that episode out"
             raise InvalidDemonstrationsError(
                 f"{episode}: time does not increase at frame {frame} ({times[frame - 1]:g} s, then "
                 f"{times[frame]:g} s); {remedy}"
@@ -175,6 +181,12 @@ class Recording:
     def period(self) -> float:
         """Median time between two frames, in [s]."""
         return float(np.median(np.diff(self.times)))
+
+
+def _way(positions: Positions) -> float:
+    """How far the channels go in all, each in shares of its range."""
+    ranges = np.ptp(positions, axis=0)
+    return float(np.sum(np.abs(np.diff(positions, axis=0)) / np.where(ranges > 0, ranges, 1)))
 
 
 def refuse_exchanged(episode: str, positions: Positions) -> None:
