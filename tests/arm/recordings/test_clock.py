@@ -152,6 +152,13 @@ def test_serial_dates_are_in_days():
     np.testing.assert_allclose(clock.times, np.arange(200) / 100, atol=1e-6)
 
 
+def test_a_rate_that_contradicts_the_name_of_a_recording_is_refused():
+    assert clock_of("throw_0_100Hz", 3, rate=100.0).period == pytest.approx(0.01)
+    says = "--rate 100, but the name of episode throw_4_50Hz says 50Hz: import .* --append"
+    with pytest.raises(ConfigurationError, match=says):
+        clock_of("throw_4_50Hz", 3, rate=100.0)
+
+
 def test_a_rate_settles_the_unit_of_times():
     stamps = np.arange(200) * 10.0
     clock = clock_of("a", 200, stamps=stamps, name="t", rate=100)

@@ -44,6 +44,8 @@ _QUALIFIES = re.compile(
     r"rel(ative)?|abs(olute)?|local|utc|gmt|unix|epoch|elapsed|system|ros|robot|controller|pc", re.I
 )
 """Words that say what kind of time it is, and no unit."""
+_HERTZ = re.compile(r"(\d+(?:\.\d+)?)[ _-]?hz", re.I)
+"""`throw_4_50Hz`."""
 _SHORTEST, LONGEST = 0.1, 60.0
 """Seconds that a throw, slide or swing is recorded for. Ours, and wide on purpose."""
 SAME_RATE = 0.05
@@ -220,6 +222,12 @@ def clock_of(
     if numbers.shape != (count,):
         raise InvalidDemonstrationsError(
             f"episode {episode} has {count} frames, but {name} of shape {numbers.shape}; expected "
+        in_name = _HERTZ.search(episode)
+        if in_name and not _same(rate, float(in_name[1])):
+            raise ConfigurationError(
+                f"--rate {rate:g}, but the name of episode {episode} says {in_name[0]}: import "
+                "those of each rate by themselves, with --append; if it is no rate, rename it"
+            )
             "one time a frame"
         )
     known = unit or split_unit(name, SECONDS)[1]
