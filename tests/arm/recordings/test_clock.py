@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.arm.recordings.clock import clock_of, declared_rate, skips_frames
+from prior_reinforce.arm.recordings.clock import clock_of, counts_down, declared_rate, skips_frames
 from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
@@ -150,6 +150,32 @@ def test_serial_dates_are_in_days():
         assert doubt.option == "--time-unit day"
     clock = clock_of("a", 200, stamps=stamps, name="time", time_unit="day")
     np.testing.assert_allclose(clock.times, np.arange(200) / 100, atol=1e-6)
+
+
+@pytest.mark.parametrize("rate", [None, 125.0])
+def test_ticks_since_the_year_1_are_of_100_ns(rate):
+    stamps = 6.39e17 + np.arange(200) * 80_000
+    clock = clock_of("a", 200, stamps=stamps, name="Ticks", rate=rate)
+    assert clock.ambiguities == ()
+    np.testing.assert_allclose(clock.times, np.arange(200) / 125, atol=2e-5)
+
+
+def test_other_ticks_are_asked_for_their_length():
+    stamps = np.arange(200) * 80_000.0
+    (doubt,) = clock_of("a", 200, stamps=stamps, name="Ticks").ambiguities
+    assert "80000, and nothing says how long a tick is" in doubt.what
+    assert (doubt.option, doubt.guessed) == ("--time-unit UNIT", False)
+
+
+@pytest.mark.parametrize("rate", [None, 100.0, 125.0])
+def test_a_time_that_counts_down_is_named(rate):
+    left = 2.0 - np.arange(200) / 100
+    says = "time_to_release falls with every frame, as what counts down does"
+    with pytest.raises(InvalidDemonstrationsError, match=says):
+        clock_of("a", 200, stamps=left, name="time_to_release", rate=rate)
+    assert counts_down("time_to_release", left)
+    assert not counts_down("fall", left)
+    assert not counts_down("t", -left)
 
 
 def test_a_rate_that_contradicts_the_name_of_a_recording_is_refused():

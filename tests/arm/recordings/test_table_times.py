@@ -12,6 +12,7 @@ from prior_reinforce.arm.recordings.beside import moving_beside
 from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
+    InvalidDemonstrationsError,
     UnclearUnitsError,
 )
 from tests.arm.recordings.recorded import (
@@ -259,3 +260,18 @@ def test_thousands_in_a_column_of_times_are_told_as_such(tmp_path):
     (tmp_path / "a.csv").write_text("\n".join(["Zeit [ms];pan", *rows]))
     with pytest.raises(FileFormatError, match=r"'1\.000', expected a time; if that is"):
         read_recordings(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize(("name", "stamp"), [("Ticks", 80_000), ("time_to_release", -0.008)])
+def test_ticks_are_the_times_and_what_counts_down_is_refused_beside_a_rate(tmp_path, name, stamp):
+    t, q = sampled(0, 125)
+    start = 639_000_000_000_000_000 if stamp > 0 else 2.0
+    stamps = [start + i * stamp for i in range(len(t))]
+    pd.DataFrame(q, columns=JOINTS).assign(**{name: stamps}).to_csv(tmp_path / "0.csv", index=False)
+    if stamp > 0:
+        (recording,) = read_recordings(tmp_path)
+        np.testing.assert_allclose(recording.times, t, atol=2e-5)
+        return
+    with pytest.raises(InvalidDemonstrationsError, match="falls with every frame"):
+        read_recordings(tmp_path, rate=100)
+    assert read_recordings(tmp_path, rate=125, time_column="none")

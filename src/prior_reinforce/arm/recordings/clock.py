@@ -58,6 +58,8 @@ _LOWEST_RATE, _HIGHEST_RATE = 1e-3, 1e6
 """Declared frames a second beyond which a file is damaged. Ours."""
 _SLOWEST, _FASTEST = 1.0, 1e4
 """And beyond which a rate or a unit is doubted although the file or a person says it. Ours."""
+_TICKS = (6.3e17, 6.6e17)
+"""Numbers that are .NET's ticks of 100 ns since the year 1, from 1997 to 2092."""
 FEWEST_COUNTS = 20
 """Frames of which it can be said that something counts them. Ours."""
 COUNTER = re.compile(
@@ -97,8 +99,18 @@ def rises(values: Stamps) -> bool:
 
 
 def tells_time(name: str, values: Stamps) -> bool:
-    """Whether a column rises steadily, and its name or the unit in it says that it is a time."""
-    return (says_time(name) or split_unit(name, SECONDS)[1] is not None) and rises(values)
+    """Whether a column rises steadily, and its name, its unit or its numbers say it is a time."""
+    said = says_time(name) or split_unit(name, SECONDS)[1] is not None or _are_ticks(values)
+    return said and rises(values)
+
+
+def counts_down(name: str, values: Stamps) -> bool:
+    """Whether a column called a time falls steadily: `time_to_release`."""
+    return says_time(name) and rises(-values.astype(float))
+
+
+def _are_ticks(values: Stamps) -> bool:
+    return values.size > 0 and _TICKS[0] < values.min() and values.max() < _TICKS[1]
 
 
 def skips_frames(values: Stamps) -> bool:
@@ -210,6 +222,12 @@ def clock_of(
         times = np.arange(count) / own
         if rate is None:
             return Clock(times, f"{name} in the file", _doubt_rate(name, own, count))
+        in_name = _HERTZ.search(episode)
+        if in_name and not _same(rate, float(in_name[1])):
+            raise ConfigurationError(
+                f"--rate {rate:g}, but the name of episode {episode} says {in_name[0]}: import "
+                "those of each rate by themselves, with --append; if it is no rate, rename it"
+            )
         differs = own_rate is not None and not _same(rate, own_rate)
         said = f" ({name} in the file says {own_rate:g} Hz)" if differs else ""
         return Clock(times, f"the given rate{said}")
@@ -222,15 +240,11 @@ def clock_of(
     if numbers.shape != (count,):
         raise InvalidDemonstrationsError(
             f"episode {episode} has {count} frames, but {name} of shape {numbers.shape}; expected "
-        in_name = _HERTZ.search(episode)
-        if in_name and not _same(rate, float(in_name[1])):
-            raise ConfigurationError(
-                f"--rate {rate:g}, but the name of episode {episode} says {in_name[0]}: import "
-                "those of each rate by themselves, with --append; if it is no rate, rename it"
-            )
             "one time a frame"
         )
     known = unit or split_unit(name, SECONDS)[1]
+    if known is None and _are_ticks(numbers):
+        numbers, known = (numbers - numbers[0]) * 100, "ns"
     unknown = None if known or time_unit else _IN_BRACKETS.search(name)
     if unknown is not None and not _QUALIFIES.fullmatch(unknown[1]):
         raise FileFormatError(
@@ -247,6 +261,11 @@ def clock_of(
         return Clock(numbers / step / frames, f"{name}, frames at {frames:g} Hz")
     if not np.all(np.isfinite(numbers)):
         return Clock(numbers, name)  # the recording names the frame
+    if rises(-numbers):
+        raise InvalidDemonstrationsError(
+            f"episode {episode}: {name} falls with every frame, as what counts down does: write "
+            "its negative, or turn frames in reverse round, or give --time-column none --rate HZ"
+        )
     # From the first on, since nanoseconds since 1970 are 0.2 us coarse as floats.
     elapsed = numbers - (numbers[0] if count else 0.0)
     period = float(np.median(np.diff(numbers))) if count > 1 else 0.0
@@ -305,6 +324,7 @@ def clock_among(
     fit = [name for name, array in arrays.items() if array.shape == (count,)]
     times = [n for n in arrays if split_unit(n, SECONDS)[0] in _CALLED]
     times += [n for n in fit if n not in times and tells_time(n, arrays[n])]
+    times = times or [n for n in fit if counts_down(n, arrays[n])]
     if asked is not None and asked not in (*arrays, NO_COLUMN):
         raise FileFormatError(f"{where} has no array {asked}; it holds {sorted(arrays)}: name one")
     timed = asked is not None and bool(times)
@@ -418,6 +438,10 @@ def _judge(
         return "s", (Ambiguity(what, "--time-unit frame --rate HZ", guessed=False),)
     if said is None and period == 1:
         what += " (or it counts frames: --time-unit frame --rate HZ)"
+    elif said is None and "tick" in name.lower():
+        what = f"{name} steps by {period:g}, and nothing says how long a tick is"
+        what += " (.NET's are 100 ns: then write that column in ns, times 100)"
+        return "s", (Ambiguity(what, "--time-unit UNIT", guessed=False),)
     return looks, (Ambiguity(what, f"--time-unit {looks}"),)
 
 

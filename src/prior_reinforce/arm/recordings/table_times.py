@@ -20,6 +20,7 @@ from prior_reinforce.arm.recordings.clock import (
     SAME_RATE,
     Clock,
     Times,
+    counts_down,
     declared_rate,
     hold_together,
     is_periods,
@@ -154,6 +155,7 @@ def time_columns(
     called = [i for i in called if i in free]
     called += [i for i in free if tells_time(table.names[i], table.stamps(i))]
     called += [i for i in free if i not in called and _are_dates(table, i)]
+    called = called or [i for i in free if counts_down(table.names[i], table.stamps(i))]
     _refuse_several(table, called)
     if called:
         held = [i for i in free if says_time(table.names[i])]
