@@ -279,3 +279,14 @@ def test_a_gripper_in_another_array_is_named_with_the_option_that_takes_it(tmp_p
         import_demonstrations(
             tmp_path, outcomes={"a": [1.0, 0.0]}, joints=["pan", "lift", "gripper"]
         )
+
+
+def test_an_array_a_throw_is_an_episode_each(tmp_path):
+    own = {f"throw_{i}": sampled(i, 100)[1] for i in range(N)}
+    np.savez(tmp_path / "throws.npz", **own, dt=0.01)
+    read = read_recordings(tmp_path / "throws.npz", leave_out=("throw_1",))
+    assert [r.episode for r in read] == [name for name in own if name != "throw_1"]
+    for recording in read:
+        np.testing.assert_array_equal(recording.positions, own[recording.episode])
+    (one,) = read_recordings(tmp_path / "throws.npz", key="throw_1")
+    np.testing.assert_array_equal(one.positions, own["throw_1"])

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import re
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ from prior_reinforce.arm.recordings.recording import (
     Recording,
     files_at,
     named_damage,
+    natural_order,
     unread,
 )
 from prior_reinforce.arm.recordings.stated import recorded_among
@@ -33,6 +35,7 @@ from prior_reinforce.files import open_npz
 
 SUFFIXES = (".npz", ".npy")
 _MOTION_KEYS = ("q", "plans", "positions", "actions")
+_TAKE = re.compile(r"(.+?)_?\d+")
 _OUTCOME_KEYS = ("outcome", "outcomes", "outcomes_seen")
 
 
@@ -47,7 +50,14 @@ def read(source: Path, options: ReadOptions) -> Episodes:
 
 
 def _each(path: Path, arrays: Arrays, options: ReadOptions) -> Episodes:
-    """Every episode of a file; an array `episode` of numbers says of which each frame is."""
+    """Every episode of a file, each an array `throw_0`, or frames that an array numbers."""
+    numbered = {name: found[1].lower() for name in arrays if (found := _TAKE.fullmatch(name))}
+    takes = [n for n, own in numbered.items() if own in EPISODE_COLUMNS and arrays[n].ndim == 2]
+    if len(takes) > 1 and not options.key:
+        shared = {name: array for name, array in arrays.items() if name not in takes}
+        for name in sorted(takes, key=natural_order):
+            yield from _episodes(path, {_MOTION_KEYS[0]: arrays[name], **shared}, name, options)
+        return
     said = next((name for name in arrays if name.lower() in EPISODE_COLUMNS), None)
     if said is None or arrays[said].ndim != 1 or len(set(arrays[said].tolist())) < 2:
         yield from _episodes(path, arrays, path.stem, options)
