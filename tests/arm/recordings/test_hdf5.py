@@ -311,3 +311,16 @@ def test_a_declared_rate_of_zero_is_named_also_beside_what_rises(tmp_path):
         file["q"].attrs["fps"] = 0.0
     with pytest.raises(FileFormatError, match="fps says 0 frames a second; mend it"):
         read_recordings(tmp_path, key="q")
+
+
+def test_packed_numbers_are_unpacked(tmp_path):
+    t, q = sampled(0, 50)
+    with h5py.File(tmp_path / "0.h5", "w") as file:
+        file["time"], file["q"] = t, np.round((q - 0.5) / 1e-4).astype(np.int16)
+        file["q"].attrs.update({"scale_factor": 1e-4, "add_offset": np.array([0.5])})
+    (read,) = read_recordings(tmp_path, key="q")
+    np.testing.assert_allclose(read.positions, q, atol=6e-5)
+    with h5py.File(tmp_path / "0.h5", "a") as file:
+        file["q"].attrs["scale_factor"] = "1e-4"
+    with pytest.raises(FileFormatError, match=r"q is packed by .*scale_factor.*unpack it"):
+        read_recordings(tmp_path, key="q")

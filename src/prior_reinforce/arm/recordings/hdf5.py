@@ -38,6 +38,8 @@ _MOST_BESIDE, _MOST_BYTES_OF_NAMES = 64, 100_000
 """Members of a group that is looked through for names, and bytes of these."""
 _MOST_AT_OWN_RATE = 1_000_000
 """Numbers of what moves at another rate than the motion. Ours: sound has more."""
+_PACKING = ("scale_factor", "add_offset")
+"""Attributes by which netCDF packs numbers: number * scale_factor + add_offset."""
 _EPISODE = re.compile(r"(demo|traj|episode)_?\d+")
 
 
@@ -160,10 +162,18 @@ def _motion(path: Path, group: Any, key: str) -> np.ndarray:
 
 
 def _numbers(path: Path, name: str, found: Any) -> Stamps:
-    """The numbers of an array, unless its header claims more than a recording has."""
+    """The numbers of an array, unpacked, unless its header claims more than a recording has."""
     for what, shape in ((name, found.shape), (f"a chunk of {name}", found.chunks or ())):
         check_numbers(path, what, shape, found.dtype.itemsize)
-    return np.asarray(found[()])
+    numbers = np.asarray(found[()])
+    packed = {n: np.asarray(found.attrs[n]) for n in _PACKING if n in found.attrs}
+    if any(own.size != 1 or own.dtype.kind not in "fiu" for own in packed.values()):
+        raise FileFormatError(
+            f"{path}: {name} is packed by {packed}, expected two numbers: unpack it"
+        )
+    if packed:
+        numbers = numbers * packed.get(_PACKING[0], 1.0) + packed.get(_PACKING[1], 0.0)
+    return numbers
 
 
 def _own(path: Path, group: Any, key: str, depth: int = 8) -> Any:
