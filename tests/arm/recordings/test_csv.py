@@ -517,3 +517,12 @@ def test_an_episode_column_counts_beside_columns_that_pandas_numbered(tmp_path):
     frame.to_csv(tmp_path / "a.csv", index=False)
     read = read_recordings(tmp_path / "a.csv", rate=50)
     assert [(one.episode, one.positions.shape) for one in read] == [("3", (30, 3)), ("4", (30, 3))]
+
+
+def test_axes_that_are_not_there_are_left_out(tmp_path):
+    t, q = sampled(0, 50)
+    frame = pd.DataFrame(q, columns=JOINTS).assign(t=t, eax_a=9e9, eax_b=9e9)
+    frame.to_csv(tmp_path / "0.csv", index=False)
+    (recording,) = read_recordings(tmp_path)
+    assert recording.names == JOINTS
+    assert recording.remarks[0].startswith("eax_a, eax_b left out, which is 9E+09 all along")

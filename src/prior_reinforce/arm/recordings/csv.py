@@ -50,6 +50,8 @@ SUFFIXES = (".csv", ".tsv")
 IN_TEXT = (".txt", ".dat", ".log")
 """Read where nothing else is there, because much else has such names."""
 _MOST_WORDS = 8
+_ABSENT = 9e9
+"""What ABB writes for the position of an axis that is not there."""
 """Texts between which a column switches. Ours."""
 
 
@@ -231,7 +233,9 @@ def _episode(
     if not all_read:  # else only those that change between a few: `on` and `off`
         texts = [i for i in texts if 1 < len({*table.cells[i]} - {""}) <= _MOST_WORDS]
     for left, why in (
+    absent = [i for i in channels if found is None and np.all(table.values[:, i] == _ABSENT)]
         (rising, "rises with every row, as times and counters do"),
+        (absent, "is 9E+09 all along, as ABB writes of an axis that is not there"),
         (texts, "holds no number"),
     ):
         channels = [i for i in channels if i not in left]
