@@ -526,3 +526,22 @@ def test_axes_that_are_not_there_are_left_out(tmp_path):
     (recording,) = read_recordings(tmp_path)
     assert recording.names == JOINTS
     assert recording.remarks[0].startswith("eax_a, eax_b left out, which is 9E+09 all along")
+
+
+@pytest.mark.parametrize("joints", [None, JOINTS])
+def test_numbers_in_another_form_in_every_row_are_told_as_such(tmp_path, joints):
+    t, q = sampled(0, 50)
+    frame = pd.DataFrame(q, columns=JOINTS).assign(t=t)
+    frame[JOINTS[1]] = [f"({abs(x):.6f})" for x in q[:, 1]]
+    frame.loc[3, JOINTS[1]] = "0.2" if joints is None else "(0.2)"
+    frame.to_csv(tmp_path / "0.csv", index=False)
+    with pytest.raises(FileFormatError, match=r"\(0\.\d+\)'.* plain numbers, -0\.6 for \(0\.6\)"):
+        read_recordings(tmp_path, joints=joints)
+
+
+def test_lists_in_braces_are_read(tmp_path):
+    t, q = sampled(0, 50)
+    cells = ["{" + ", ".join(f"{x:.6f}" for x in row) + "}" for row in q]
+    pd.DataFrame({"t": t, "QActual": cells}).to_csv(tmp_path / "0.csv", index=False)
+    (recording,) = read_recordings(tmp_path)
+    np.testing.assert_allclose(recording.positions, q, atol=1e-6)

@@ -7,6 +7,7 @@ channels. Logs of libfranka and of RTDE are known by their columns.
 from __future__ import annotations
 
 import contextlib
+import re
 import shlex
 from collections.abc import Sequence
 from functools import partial
@@ -42,16 +43,16 @@ from prior_reinforce.arm.recordings.table_times import (
     time_columns,
     with_whole_dates,
 )
-from prior_reinforce.arm.recordings.tables import Table, is_unnamed, read_table
+from prior_reinforce.arm.recordings.tables import PLAIN, Table, is_unnamed, read_table
 from prior_reinforce.arm.recordings.units import Ambiguity, say_names
 from prior_reinforce.errors import FileFormatError
 
 SUFFIXES = (".csv", ".tsv")
 IN_TEXT = (".txt", ".dat", ".log")
 """Read where nothing else is there, because much else has such names."""
-_MOST_WORDS = 8
 _ABSENT = 9e9
 """What ABB writes for the position of an axis that is not there."""
+_MOST_WORDS = 8
 """Texts between which a column switches. Ours."""
 
 
@@ -232,10 +233,10 @@ def _episode(
     texts = [i for i in others if table.is_text(i)]
     if not all_read:  # else only those that change between a few: `on` and `off`
         texts = [i for i in texts if 1 < len({*table.cells[i]} - {""}) <= _MOST_WORDS]
-    for left, why in (
     absent = [i for i in channels if found is None and np.all(table.values[:, i] == _ABSENT)]
-        (rising, "rises with every row, as times and counters do"),
+    for left, why in (
         (absent, "is 9E+09 all along, as ABB writes of an axis that is not there"),
+        (rising, "rises with every row, as times and counters do"),
         (texts, "holds no number"),
     ):
         channels = [i for i in channels if i not in left]
@@ -299,9 +300,9 @@ def _refuse_text(
         is_tool = opens and not found and kinds([names[i]])[0] is Kind.TOOL
         if (i in found or is_tool) and table.is_text(i) and any(cells):
             text = next(filter(None, cells))
+            remedy = PLAIN if re.search(r"\d", text) else "write 1 and 0, or what was measured"
             raise FileFormatError(
-                f"{table.where}: {names[i]} holds {text[:20]!r} and no numbers; write 1 and 0, or "
-                "what was measured"
+                f"{table.where}: {names[i]} holds {text[:20]!r} and no numbers; {remedy}"
             )
 
 

@@ -39,7 +39,9 @@ _SAMPLE = 40
 """Lines from which a dialect is inferred."""
 _WESTERN = set("°µ²³äöüÄÖÜßàâçéèêëîïôùûñÀÉÈáíóúãõåæøÅÆØ")
 """Non-ASCII characters in tables that a Western Excel saves in its own code page."""
-_LIST = re.compile(r"\s*[\[(]\s*[-+.\deE]+([,\s]+[-+.\deE]+)+\s*[\])]\s*")
+_LIST = re.compile(r"\s*[\[({]\s*[-+.\deE]+([,\s]+[-+.\deE]+)+\s*[\])}]\s*")
+PLAIN = "write plain numbers, -0.6 for (0.6), 0.5 for '0.5 sec', and several as [0.1, 0.2]"
+"""What to do about a column of numbers in other forms."""
 _DATE = re.compile(r"\d{4}-\d\d-\d\d|\d{1,2}:\d\d|\d{1,2}[/.]\d{1,2}[/.]\d{4}")
 _THOUSANDS = re.compile(
     r"[+-]?\d{1,3}(?:(['’\u00a0\u202f])\d{3}(\1\d{3})*([.,]\d*)?|( \d{3})+[.,]\d+)"
@@ -103,12 +105,17 @@ class Table:
 
     def numbers(self, column: int) -> Column:
         """Return a column as numbers; FileFormatError names the line of a cell that is none."""
-        for i in np.flatnonzero(np.isnan(self.values[:, column])).tolist():
+        none = np.flatnonzero(np.isnan(self.values[:, column])).tolist()
+        bad = [self.cells[column][i] for i in none]
+        for i in none:
             text = self.cells[column][i]
             if text.lower() not in _NAN:
+                remedy = "mend that cell"
+                if sum(re.search(r"\d", cell) is not None for cell in bad) > 1:
+                    remedy = f"so are {len(bad)} of {len(self)} rows: {PLAIN}"
                 raise FileFormatError(
                     f"{self.where}, line {self.lines[i]}: {self.names[column]} is {text[:40]!r}, "
-                    "expected a number; mend that cell, or keep other columns"
+                    f"expected a number; {remedy}, or keep other columns"
                 )
         return self.values[:, column]
 
@@ -399,7 +406,7 @@ def _without_lists(where: str, columns: list[_Column]) -> list[_Column]:
         if not (column and all(_LIST.fullmatch(cell) for cell in column)):
             parts.append((name, unit, column))
             continue
-        rows = [cell.strip("[]() ").replace(",", " ").split() for cell in column]
+        rows = [cell.strip("[](){} ").replace(",", " ").split() for cell in column]
         if len(set(map(len, rows))) > 1:
             raise FileFormatError(
                 f"{where}: column {name} holds lists of {min(map(len, rows))} to "
