@@ -165,6 +165,8 @@ def test_other_ticks_are_asked_for_their_length():
     (doubt,) = clock_of("a", 200, stamps=stamps, name="Ticks").ambiguities
     assert "80000, and nothing says how long a tick is" in doubt.what
     assert (doubt.option, doubt.guessed) == ("--time-unit UNIT", False)
+    (doubt,) = clock_of("a", 200, stamps=stamps / 1e4, name="tick").ambiguities
+    assert doubt.option == "--time-unit ms"
 
 
 @pytest.mark.parametrize("rate", [None, 100.0, 125.0])

@@ -438,7 +438,7 @@ def _judge(
         return "s", (Ambiguity(what, "--time-unit frame --rate HZ", guessed=False),)
     if said is None and period == 1:
         what += " (or it counts frames: --time-unit frame --rate HZ)"
-    elif said is None and "tick" in name.lower():
+    elif said is None and "tick" in name.lower() and _SLOWEST <= 1e7 / period <= _FASTEST:
         what = f"{name} steps by {period:g}, and nothing says how long a tick is"
         what += " (.NET's are 100 ns: then write that column in ns, times 100)"
         return "s", (Ambiguity(what, "--time-unit UNIT", guessed=False),)
