@@ -180,6 +180,24 @@ def test_where_an_object_was_lost_the_next_plan_is_moved_half_as_far():
     assert "farther than" not in arm.adapter.expect(GOALS[0], GOALS[0], 0.015).remark
 
 
+def test_what_is_read_after_a_loss_takes_it_back_until_the_object_is_lost_again():
+    arm, goal = Arm(off=(-0.1, 0.0)), np.array([1.1, 0.1])
+    lost = Reading.only(False, 2, lost=True)
+    first = arm.adapter.propose(goal)
+    arm.adapter.observe(first, goal, lost)
+    held, _ = arm.throw(goal)
+    assert np.linalg.norm(held) < np.linalg.norm(first)
+    again = arm.adapter.propose(goal)  # the throw was read as too short
+    assert np.linalg.norm(again) > np.linalg.norm(first)
+    assert not arm.adapter.expect(again, goal, 0.015).nearer
+    arm.adapter.observe(again, goal, lost)
+    for _ in range(2):
+        condition, _ = arm.throw(goal)
+        assert np.linalg.norm(held) < np.linalg.norm(condition) < np.linalg.norm(first)
+        held = condition
+    assert arm.adapter.expect(condition, goal, 0.015).nearer
+
+
 SIX = np.array(
     [
         [0.90, -0.20, 0.50],

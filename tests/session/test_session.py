@@ -333,6 +333,15 @@ def test_trials_are_carried_over_where_they_serve_the_adapter():
     assert not session.set_goal(GOAL, carry_over=False).carry_over
 
 
+def test_a_loss_that_keeps_plans_near_is_named_with_how_to_take_it_back():
+    session = carrying()
+    session.tell(session.ask().number, "30cm long")
+    session.set_goal(GOAL)
+    session.tell(session.ask().number, "lost")
+    session.adapter._expect = lambda *of: Expectation(0.9, 1.1, nearer=True)
+    assert "since trial 2 was lost; void 2 if" in session.ask().remark
+
+
 def test_a_surprise_is_said_at_once_with_what_to_do_about_it():
     session = carrying()
     expected = Expectation(0.9, 1.1, np.array([0.01, 0.0]), np.array([0.01, 0.02]))

@@ -34,6 +34,8 @@ class Expectation:
     """Its standard deviation, likewise."""
     remark: str = ""
     """What a person should know beforehand, in one line, such as that a symmetry does not hold."""
+    nearer: bool = False
+    """Whether the plan is moved less far than readings say, because an object was lost."""
 
 
 @dataclass(frozen=True, eq=False)

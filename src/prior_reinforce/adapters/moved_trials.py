@@ -36,28 +36,28 @@ class MovedTrials:
         self.belief = MovedBelief(demonstrations, config.p_change)
         self.chart = self.belief.symmetry.chart
         self.now = 0
-        self._lost: list[tuple[Point, Point]] = []
+        self._lost: list[tuple[Point, Point, int]] = []  # goal, aim, trials read before it
 
     def state(self) -> State:
         """What `resume` needs."""
         state = self.belief.state()
-        lost = [[goal.tolist(), aim.tolist()] for goal, aim in self._lost]
+        lost = [[goal.tolist(), aim.tolist(), at] for goal, aim, at in self._lost]
         return State({**state.facts, "now": self.now, "lost": lost}, state.arrays)
 
     def resume(self, state: State) -> None:
         """Go on from what `state` gave."""
         self.belief.resume(state)
         self.now = state.facts["now"]
-        self._lost = [(np.array(goal), np.array(aim)) for goal, aim in state.facts["lost"]]
+        self._lost = [(np.array(goal), np.array(aim), at) for goal, aim, at in state.facts["lost"]]
 
     def observe(self, condition: Point, goal: Point, reading: Reading) -> None:
         """Take in one trial; see `Adapter.observe`.
 
-        Where the object was lost, the next plan for that goal is moved half as far: nearer to what
-        was demonstrated it stays.
+        Where the object was lost, the next plan for that goal is moved half as far. What is read
+        then takes that back; where the object is lost again, plans stay nearer than those lost.
         """
         if reading.lost:
-            self._lost.append((goal, self.chart.to(condition)))
+            self._lost.append((goal, self.chart.to(condition), self.now))
             return
         radius = reading.missed_by_at_least
         none = np.zeros_like(goal)
@@ -82,8 +82,7 @@ class MovedTrials:
 
     def propose(self, goal: Point) -> Point:
         """Return the condition to try next; see `Adapter.propose`."""
-        aim = self.belief.aim(goal, self.now, self._farthest(goal))
-        condition = self.chart.back(self._held_back(aim, goal))
+        condition = self.chart.back(self._aim(goal, self._losses(goal)))
         missed = self._told_as_now(goal)
         if tried_again(condition[None], self.chart.back(missed.conditions), missed.missed_by)[0]:
             return self._likeliest_beside(condition, goal, missed)
@@ -103,7 +102,9 @@ class MovedTrials:
         error = share @ np.array(means)
         variance = share @ (np.array(variances) + np.square(means)) - error**2
         sd = np.sqrt(variance + np.square(OF_TOLERANCE * tolerance))
-        return Expectation(p_hit, trials, error, sd, self.remark(goal))
+        losses = self._losses(goal)
+        nearer = bool(losses) and not np.allclose(self._aim(goal, losses), self._aim(goal, []))
+        return Expectation(p_hit, trials, error, sd, self.remark(goal), nearer)
 
     def p_hit(
         self, conditions: Points, goals: Points, tolerance: Point, seed: int = 1
@@ -154,7 +155,10 @@ class MovedTrials:
     def remark(self, goal: Point) -> str:
         """What a person should know before the next trial for a goal, in one line, or nothing."""
         belief, model, symmetry = self.belief, self.belief.model(0), self.belief.symmetry
-        aim, farthest = belief.aim(goal, self.now, self._farthest(goal)), symmetry.farthest
+        aim, farthest = (
+            belief.aim(goal, self.now, self._farthest(self._losses(goal))),
+            symmetry.farthest,
+        )
         w = belief.prior.moved(aim[None])[0]
         error = (
             belief.outcomes(0, self._places(self.chart.back(aim)[None], goal[None])).mean[0] - goal
@@ -183,26 +187,48 @@ class MovedTrials:
             return np.asarray(OF_TOLERANCE * told[-1])
         return np.asarray(EXECUTION * UNIT * self.belief.prior.size)
 
-    def _farthest(self, goal: Point) -> Point:
-        """By how much plans for a goal may be moved: nearer than where an object was lost."""
-        symmetry, left = self.belief.symmetry, self.belief.prior.left
+    def _aim(self, goal: Point, losses: list[tuple[Point, Points]]) -> Point:
+        """Return the aim for a goal, in the chart."""
+        aim = self.belief.aim(goal, self.now, self._farthest(losses))
+        return self._held_back(aim, losses)
+
+    def _losses(self, goal: Point) -> list[tuple[Point, Points]]:
+        """Aims for a goal that lost an object, and what was read of that goal: nearer to it.
+
+        None where it was lost once and read since: nobody knows what that loss was.
+        """
+        losses = [(aim, at) for about, aim, at in self._lost if np.array_equal(about, goal)]
+        memory, again = self.belief.memory, len({at for _, at in losses}) > 1
+        of_goal = np.all(memory.goals == goal, axis=1)
+        since = of_goal & (memory.numbers >= max((at for _, at in losses), default=0))
+        if not again and np.any(since):
+            return []
+        return [(aim, memory.conditions[of_goal & again]) for aim, _ in losses]
+
+    def _farthest(self, losses: list[tuple[Point, Points]]) -> Point:
+        """By how much plans may be moved: nearer than where an object was lost."""
+        symmetry, left, moved = (
+            self.belief.symmetry,
+            self.belief.prior.left,
+            self.belief.prior.moved,
+        )
         farthest = np.where(symmetry.learned, 0.0, symmetry.farthest)
-        which = left if len(left) else np.arange(len(goal))
-        for about, aim in self._lost:
-            if np.array_equal(about, goal):
-                w = np.abs(self.belief.prior.moved(aim[None])[0])
-                farthest[which] = np.minimum(farthest, _BACK * w)[which]
+        which = left if len(left) else np.arange(symmetry.k)
+        for lost, read in losses:
+            within = np.abs(moved(read)).max(axis=0, initial=0.0)
+            way = within + _BACK * np.maximum(np.abs(moved(lost[None])[0]) - within, 0.0)
+            farthest[which] = np.minimum(farthest, way)[which]
         return farthest
 
-    def _held_back(self, aim: Point, goal: Point) -> Point:
+    def _held_back(self, aim: Point, losses: list[tuple[Point, Points]]) -> Point:
         """Nearer to a demonstration than where an object was lost, in what is learned."""
         learned, z = self.belief.symmetry.learned, self.belief.prior.anchors.z
-        for about, lost in self._lost:
-            if np.array_equal(about, goal):
-                apart = (z - lost)[:, learned] / np.ptp(z, axis=0)[learned]
-                nearest = z[np.argmin(np.square(apart).sum(axis=1))]
-                way = _BACK * np.abs(lost - nearest)
-                aim = np.where(learned, nearest + np.clip(aim - nearest, -way, way), aim)
+        for lost, read in losses:
+            apart = (z - lost)[:, learned] / np.ptp(z, axis=0)[learned]
+            nearest = z[np.argmin(np.square(apart).sum(axis=1))]
+            within = np.abs(read - nearest).max(axis=0, initial=0.0)
+            way = within + _BACK * np.maximum(np.abs(lost - nearest) - within, 0.0)
+            aim = np.where(learned, nearest + np.clip(aim - nearest, -way, way), aim)
         return aim
 
     def _places(self, conditions: Points, goals: Points) -> Places:

@@ -17,7 +17,7 @@ from prior_reinforce.session.events import Asked
 from prior_reinforce.session.trials import Goal, Log, State, Verdict
 
 if TYPE_CHECKING:
-    from prior_reinforce.adapters.base import Adapter
+    from prior_reinforce.adapters.base import Adapter, Expectation
     from prior_reinforce.generators.base import Generator
     from prior_reinforce.plans.motions import Demonstrations
 
@@ -106,8 +106,26 @@ class InUse:
             expected_trials=None if expected is None else expected.trials,
             expected_error=None if expected is None else _as_list(expected.error),
             expected_sd=None if expected is None else _as_list(expected.sd),
-            remark=("" if expected is None else expected.remark) or self._taken_back(),
+            remark=self._remark(state, expected),
         )
+
+    def _remark(self, state: State, expected: Expectation | None) -> str:
+        """What a person should know before a trial."""
+        if expected is None:
+            return self._taken_back()
+        if expected.nearer:
+            goal = latest_goal(state)
+            n = [
+                trial.number
+                for trial in state.readings_for(goal, self.names[0])
+                if trial.reading and trial.reading.lost
+                if np.array_equal(state.goal_of(trial).goal, goal.goal)
+            ][-1]
+            return (
+                f"kept nearer to the demonstration, since trial {n} was lost; void {n} if that was "
+                "no fault of the motion"
+            )
+        return expected.remark or self._taken_back()
 
     def _taken_back(self) -> str:
         """What is said where the declared axis was left; nothing where it was not."""
