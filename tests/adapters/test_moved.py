@@ -315,7 +315,12 @@ def test_a_goal_farther_than_motions_can_be_moved_is_named():
     assert np.linalg.norm(condition) < 0.96 * np.exp(0.9)
     expected = adapter.expect(condition, far, TOLERANCE)
     assert "demonstrate nearer to [4.0, 0.0]" in expected.remark
+    assert "is farther than" in expected.remark
     assert expected.p_hit < 0.05
+    assert expected.beyond
+    assert not adapter.expect(GOALS[0], GOALS[0], TOLERANCE).beyond
+    near = np.array([0.2, 0.0])
+    assert "is nearer than" in adapter.expect(adapter.propose(near), near, TOLERANCE).remark
 
 
 def test_numbers_give_gaussian_regression_in_a_chart_that_is_the_outcomes_own():

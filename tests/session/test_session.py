@@ -16,6 +16,7 @@ from prior_reinforce.errors import (
     InvalidFeedbackError,
     InvalidGoalError,
     InvalidPlanError,
+    OutOfReachError,
     RobotLimitError,
     TrialStateError,
     WorkspaceError,
@@ -434,6 +435,36 @@ def test_a_refused_plan_never_leaves_whenever_it_is_asked_for():
     with pytest.raises(RobotLimitError, match="void it and ask again"):
         session.ask()
     session.void(1, "refused")
+
+
+def test_where_a_correction_does_not_pass_the_last_plan_that_does_is_tried_once():
+    gate = Gate()
+    session = Session(
+        RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, GOAL, 0.015, gate=gate
+    )
+    session.tell(session.ask().number, [-0.3, 0.0])
+    gate.limit = 1.0
+    trial = session.ask()
+    assert 0.99 < trial.condition[0] <= 1.0
+    np.testing.assert_array_equal(trial.plan[0], trial.condition)
+    assert trial.remark.startswith("moved only as far as passes, which may not do (1.2 is beyond")
+    session.tell(2, [-0.2, 0.0])
+    with pytest.raises(RobotLimitError, match=r"trial 2 went as far as passes, and missed: demon"):
+        session.ask()
+    session.amend(2, [0.05, 0.0])
+    assert session.ask().remark == ""
+
+
+def test_a_plan_that_is_as_far_as_may_be_is_refused_once_it_missed():
+    session = carrying()
+    session._gate = Gate()
+    beyond = Expectation(0.0, 9.0, remark="the goal is nearer than", beyond=True)
+    session.adapter._expect = lambda *of: beyond
+    session.adapter._propose = lambda goal: goal
+    session.tell(session.ask().number, hit=False)
+    session.tell(session.ask().number, [0.001, 0.02])
+    with pytest.raises(OutOfReachError, match="trial 2 made the same plan and missed: the goal is"):
+        session.ask()
 
 
 class Beside(FullStepAdapter):

@@ -36,6 +36,8 @@ class Expectation:
     """What a person should know beforehand, in one line, such as that a symmetry does not hold."""
     nearer: bool = False
     """Whether the plan is moved less far than readings say, because an object was lost."""
+    beyond: bool = False
+    """Whether no plan may be moved so far that it reaches the goal."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Int
 
 from prior_reinforce.arrays import Point, Points
 
-_AGAIN = 0.5
+AGAIN = 0.5
 """A condition closer than this share of the tolerance to one that missed the same goal would be
 tried again (ours)."""
 LATEST = 8
@@ -102,7 +102,7 @@ def tried_again(
 ) -> Bool[np.ndarray, " n"]:
     """Which conditions are next to one that missed by so much at least."""
     apart = (conditions[:, None] - tried) / missed_by
-    return np.asarray(np.any(np.linalg.norm(apart, axis=2) < _AGAIN, axis=1))
+    return np.asarray(np.any(np.linalg.norm(apart, axis=2) < AGAIN, axis=1))
 
 
 @functools.lru_cache

@@ -16,6 +16,7 @@ from prior_reinforce.adapters.moved_prior import AS_STATED, OTHER_WAY
 from prior_reinforce.adapters.p_hit import trials_to_go
 from prior_reinforce.arrays import Point, Points
 from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.symmetry import LogDistance, Polar
 from prior_reinforce.readings import Reading
 
 _NOTHING = 0.1
@@ -104,7 +105,8 @@ class MovedTrials:
         sd = np.sqrt(variance + np.square(OF_TOLERANCE * tolerance))
         losses = self._losses(goal)
         nearer = bool(losses) and not np.allclose(self._aim(goal, losses), self._aim(goal, []))
-        return Expectation(p_hit, trials, error, sd, self.remark(goal), nearer)
+        beyond = bool(self._beyond(goal))
+        return Expectation(p_hit, trials, error, sd, self.remark(goal), nearer, beyond)
 
     def p_hit(
         self, conditions: Points, goals: Points, tolerance: Point, seed: int = 1
@@ -155,19 +157,9 @@ class MovedTrials:
     def remark(self, goal: Point) -> str:
         """What a person should know before the next trial for a goal, in one line, or nothing."""
         belief, model, symmetry = self.belief, self.belief.model(0), self.belief.symmetry
-        aim, farthest = (
-            belief.aim(goal, self.now, self._farthest(self._losses(goal))),
-            symmetry.farthest,
-        )
-        w = belief.prior.moved(aim[None])[0]
-        error = (
-            belief.outcomes(0, self._places(self.chart.back(aim)[None], goal[None])).mean[0] - goal
-        )
-        if np.any(np.abs(w) >= (1.0 - 1e-6) * farthest) and np.linalg.norm(error) > np.linalg.norm(
-            self._noise
-        ):
+        if beyond := self._beyond(goal):
             return (
-                f"the goal is farther than the demonstration can be moved ({symmetry.name}); "
+                f"the goal is {beyond} than the demonstration can be moved ({symmetry.name}); "
                 f"demonstrate nearer to {np.round(goal, 3).tolist()}"
             )
         if model.name == OTHER_WAY:
@@ -178,6 +170,18 @@ class MovedTrials:
             since = belief.hypotheses[0].changes[-1].since
             return f"since trial {since + 1} outcomes lie elsewhere: was something moved?"
         return ""
+
+    def _beyond(self, goal: Point) -> str:
+        """Say whether a goal is farther or nearer than plans may be moved; nothing if neither."""
+        belief, symmetry = self.belief, self.belief.symmetry
+        aim = belief.aim(goal, self.now, self._farthest(self._losses(goal)))
+        w = belief.prior.moved(aim[None])[0]
+        there = belief.outcomes(0, self._places(self.chart.back(aim)[None], goal[None]))
+        ends = np.abs(w) >= (1.0 - 1e-6) * symmetry.farthest
+        if not np.any(ends) or np.linalg.norm(there.mean[0] - goal) <= np.linalg.norm(self._noise):
+            return ""
+        distance = isinstance(self.chart, (Polar, LogDistance))
+        return "nearer" if distance and ends[0] and w[0] < 0.0 else "farther"
 
     @property
     def _noise(self) -> Point:

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from prior_reinforce.adapters.base import next_key
+from prior_reinforce.adapters.memory import AGAIN
 from prior_reinforce.arrays import Frames, Point
-from prior_reinforce.errors import InvalidPlanError, WorkspaceError
+from prior_reinforce.errors import (
+    InvalidPlanError,
+    OutOfReachError,
+    RobotLimitError,
+    WorkspaceError,
+)
+from prior_reinforce.formats import in_tolerances
+from prior_reinforce.generators.reach import farthest_between, refusal
 from prior_reinforce.plans.symmetry import Polar
 from prior_reinforce.session.events import Asked
 from prior_reinforce.session.trials import Goal, Log, State, Verdict
@@ -92,10 +100,19 @@ class InUse:
             getattr(adapter, what)(*arguments)
         return adapter
 
-    def asked(self, state: State, condition: Point, verdict: Verdict | None) -> Asked:
-        """The event of the next trial, with what the adapter expects of it."""
+    def expected(self, state: State, condition: Point) -> Expectation | None:
+        """What the adapter expects of the next trial."""
         goal = latest_goal(state)
-        expected = self.adapter.expect(condition, goal.goal, goal.tolerance)
+        return self.adapter.expect(condition, goal.goal, goal.tolerance)
+
+    def asked(
+        self, state: State, condition: Point, verdict: Verdict | None, limited: str = ""
+    ) -> Asked:
+        """The event of the next trial, with what the adapter expects of it.
+
+        `limited` says by what limits it falls short of what the adapter asked for.
+        """
+        goal, expected = latest_goal(state), self.expected(state, condition)
         return Asked(
             trial=len(state.trials) + 1,
             goal=goal.number,
@@ -106,7 +123,7 @@ class InUse:
             expected_trials=None if expected is None else expected.trials,
             expected_error=None if expected is None else _as_list(expected.error),
             expected_sd=None if expected is None else _as_list(expected.sd),
-            remark=self._remark(state, expected),
+            remark=limited or self._remark(state, expected),
         )
 
     def _remark(self, state: State, expected: Expectation | None) -> str:
@@ -139,6 +156,51 @@ class InUse:
             f"({symmetry.name}{about}); declare that one"
         )
 
+    def passing(
+        self,
+        state: State,
+        wanted: Point,
+        plan: Frames,
+        verdict_on: Callable[[Frames, Point, str], Verdict | None],
+    ) -> tuple[Point, Frames, Any, str]:
+        """The condition and its plan; or the last that passes between the goal and that one.
+
+        Returns:
+            Condition, plan and verdict, and by what it falls short of what was wanted, if it does.
+
+        Raises:
+            OutOfReachError: No plan may be moved to the goal, and this one was tried and missed.
+            RobotLimitError: It does not pass, and the goal's own plan does not either, or the last
+                that passes was tried and missed.
+        """
+
+        def check(plan: Frames, condition: Point) -> str:
+            try:
+                verdict_on(plan, condition, "")
+            except RobotLimitError as error:
+                return str(error)
+            return ""
+
+        goal, generator = latest_goal(state).goal, self.generator
+        nearer = f"demonstrate nearer to {np.round(goal, 3).tolist()}"
+        try:
+            verdict = verdict_on(plan, wanted, self.say_no_plan(state, wanted))
+        except RobotLimitError as error:
+            if np.array_equal(wanted, goal) or refusal(generator, goal, check):
+                raise
+            nearest = farthest_between(generator, goal, wanted, check)
+            if n := _missed(state, nearest):
+                said = f"{error}; trial {n} went as far as passes, and missed: {nearer}"
+                raise RobotLimitError(said) from error
+            (plan,) = generator.generate(nearest[None])
+            limited = f"moved only as far as passes, which may not do ({error.__cause__}); {nearer}"
+            return nearest, plan, verdict_on(plan, nearest, ""), limited
+        if verdict is not None and (n := _missed(state, wanted)):
+            expected = self.expected(state, wanted)
+            if expected is not None and expected.beyond:
+                raise OutOfReachError(f"trial {n} made the same plan and missed: {expected.remark}")
+        return wanted, plan, verdict, ""
+
     def say_no_plan(self, state: State, condition: Point) -> str:
         """Say for which goal there is no plan, and whether it is simply too far."""
         goal = latest_goal(state).goal
@@ -164,6 +226,20 @@ def _told(state: State, model: str) -> Iterator[tuple[str, tuple[Any, ...]]]:
             assert trial.reading is not None
             reading = trial.reading.within(about.tolerance)
             yield "observe", (trial.condition, about.goal, reading)
+
+
+def _missed(state: State, condition: Point) -> int:
+    """Number of a trial for the goal of now that made the same plan and was seen to miss, or 0."""
+    tolerance = latest_goal(state).tolerance
+    return next(
+        (
+            trial.number
+            for trial in state.current
+            if trial.reading is not None and trial.reading.has_number and not trial.hit
+            if in_tolerances(trial.condition - condition, tolerance) < AGAIN
+        ),
+        0,
+    )
 
 
 def latest_goal(state: State) -> Goal:

@@ -223,6 +223,7 @@ class Session:
             The trial, with its plan and the gate's verdict on it.
 
         Raises:
+            OutOfReachError: No plan may be moved so far, and the farthest missed.
             RobotLimitError: The plan breaks a limit of the robot.
             TrialStateError: The open trial may not be given out again (`check_open`).
             WorkspaceError: No goal is set, or the log cannot be written.
@@ -368,8 +369,8 @@ class Session:
 
     def _open(self, state: State, parts: InUse, condition: Point, plan: Frames) -> Verdict | None:
         """Write a new trial down, if its plan may be executed."""
-        verdict = self._verdict(plan, condition, parts.say_no_plan(state, condition))
-        event = parts.asked(state, condition, verdict)
+        condition, plan, verdict, limited = parts.passing(state, condition, plan, self._verdict)
+        event = parts.asked(state, condition, verdict, limited)
         self.log.keep_adapter(parts.adapter)
         self.log.append_asked(event, plan, parts.demonstrations.format)
         return verdict
