@@ -6,7 +6,14 @@ import pytest
 from prior_reinforce.errors import InvalidFeedbackError
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.parsing import from_words, read_numbers, read_place, with_points
-from prior_reinforce.wording import in_words, say_chance, say_length, say_place, to_words
+from prior_reinforce.wording import (
+    in_words,
+    say_chance,
+    say_length,
+    say_place,
+    say_trials,
+    to_words,
+)
 
 METRES = OutcomeFormat.metres(2)
 MIXED = OutcomeFormat(("x", "t"), ("m", "s"))
@@ -80,6 +87,11 @@ def test_places_are_said_as_seen_from_the_base(place, said):
 )
 def test_lengths(length, form, said):
     assert say_length(length, form) == said
+
+
+def test_trials_to_go_are_counted_up_to_ten():
+    assert say_trials(2.24) == "about 2.2"
+    assert say_trials(67.3) == "more than 10"
 
 
 def test_a_chance_is_one_of_three_words():

@@ -36,6 +36,8 @@ TIME_WORDS: tuple[str, str] = ("late", "early")
 _AXES = {"x": 0, "y": 1, "z": 2, "height": 2}
 CHANCES = (0.0, 0.1), (0.1, 0.65), (0.65, 1.0)
 """Bounds of P(hit) for each word that says how likely a hit is."""
+_FEW_TRIALS = 10
+"""Beyond, the number is a guess, and is not said (ours)."""
 _EXAMPLE_LENGTHS = ("5cm", "2cm", "1cm")
 _EXAMPLES = {"time": "20ms", "angle": "5deg"}
 
@@ -56,6 +58,11 @@ def say_chance(p_hit: float) -> str:
     """
     _, (possible, likely), _ = CHANCES
     return "unlikely" if p_hit < possible else "likely" if p_hit >= likely else "possible"
+
+
+def say_trials(expected: float) -> str:
+    """Say how many trials are expected to the next hit: `about 2.2`, or `more than 10`."""
+    return f"about {expected:.1f}" if expected <= _FEW_TRIALS else f"more than {_FEW_TRIALS}"
 
 
 def say_count(n: int, what: str) -> str:

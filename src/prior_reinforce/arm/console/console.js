@@ -647,7 +647,8 @@ async function download(trial) {
 
 function chance(trial) {
   if (trial.p_hit === null) return null;
-  const togo = trial.expected_trials === null ? "" : `${trial.expected_trials.toFixed(1)} trials to go`;
+  const n = trial.expected_trials;
+  const togo = n === null ? "" : `${n > 10 ? "more than 10" : n.toFixed(1)} trials to go`;
   return h("p", { class: "chance", id: "chance" }, `A hit is ${trial.chance} `, h("small", {}, togo));
 }
 function surprise(trial) {

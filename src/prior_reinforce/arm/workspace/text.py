@@ -13,7 +13,7 @@ from prior_reinforce.arm.workspace.state import Standing
 from prior_reinforce.errors import TrialStateError
 from prior_reinforce.session.trials import Stage, State, Trial
 from prior_reinforce.terminal import plain
-from prior_reinforce.wording import error_example, say_chance, say_reading
+from prior_reinforce.wording import error_example, say_chance, say_reading, say_trials
 
 _POOR_TRIALS = 3
 _POOR_CHANCE = 0.35
@@ -65,7 +65,7 @@ def say_expectation(now: Standing, trial: Trial) -> list[str]:
     if trial.p_hit is None or trial.expected_trials is None:
         return []
     chance = say_chance(trial.p_hit)
-    lines = [f"a hit is {chance}; about {trial.expected_trials:.1f} trials to go"]
+    lines = [f"a hit is {chance}; {say_trials(trial.expected_trials)} trials to go"]
     if trial.remark:
         lines.append(trial.remark)
     told = [known for known in state.trials if known.stage is Stage.TOLD]
