@@ -8,7 +8,7 @@ import pytest
 from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.errors import OutOfReachError
 from prior_reinforce.generators import make_generator
-from prior_reinforce.generators.reach import goals_around, reach, refusal
+from prior_reinforce.generators.reach import farthest_between, goals_around, reach, refusal
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.symmetry import TurnJoint, TurnPath, turn_and_scale
@@ -55,6 +55,16 @@ def test_the_nearest_goal_that_passes_is_found_at_the_edge():
     assert refusal(generator, near, gentle) == ""
     assert 0.25 < np.arctan2(near[1], near[0]) <= 0.3
     assert np.linalg.norm(near - [1.0, 0.6]) < 0.35
+
+
+def test_the_nearest_goal_passes_as_it_is_said():
+    generator = learned(turn_and_scale(TurnJoint()))
+    within, wanted = np.array([1.0, 0.0]), np.array([1.0, 0.6])
+    said = lambda goal: np.ceil(goal * 10) / 10  # noqa: E731
+    plainly = farthest_between(generator, within, wanted, gentle)
+    assert refusal(generator, said(plainly), gentle) != ""
+    rounded = farthest_between(generator, within, wanted, gentle, said)
+    np.testing.assert_allclose(rounded, [1.0, 0.3])
 
 
 def test_nothing_in_reach_is_said():

@@ -21,6 +21,8 @@ from prior_reinforce.plans.symmetry import Polar
 
 Check = Callable[[Frames, Point], str]
 """Why a plan (H, D) for a goal (k,) must not be executed; empty where it may."""
+Said = Callable[[Point], Point]
+"""A goal as a person reads and enters it."""
 _MARGIN = 3.0
 """Of that box, in the demonstrations' spreads (ours)."""
 _STEPS = 9, 13
@@ -53,10 +55,12 @@ class Reach:
     """Neighbours in a row or a column are neighbours in space."""
     reached: Bool[np.ndarray, "rows columns"]
 
-    def nearest(self, generator: Generator, goal: ArrayLike, check: Check) -> Point:
+    def nearest(
+        self, generator: Generator, goal: ArrayLike, check: Check, said: Said = np.asarray
+    ) -> Point:
         """Return the goal itself if it can be reached, else the nearest found that can.
 
-        It lies on the line from the nearest of the goals that can be reached.
+        It lies on the line from the nearest of the goals that can be reached; as it is said.
 
         Raises:
             OutOfReachError: None of the goals can be reached, and the goal cannot.
@@ -68,19 +72,30 @@ class Reach:
         if not len(possible):
             raise OutOfReachError(f"no goal can be reached from these demonstrations: {why}")
         within = possible[np.argmin(np.linalg.norm(possible - wanted, axis=1))]
-        return farthest_between(generator, within, wanted, check)
+        return farthest_between(generator, within, wanted, check, said)
 
 
-def farthest_between(generator: Generator, within: Point, wanted: Point, check: Check) -> Point:
-    """Return the last goal that can be reached on the way from one that can to one that cannot."""
-    low, high = 0.0, 1.0
+def farthest_between(
+    generator: Generator, within: Point, wanted: Point, check: Check, said: Said = np.asarray
+) -> Point:
+    """Return the last goal that can be reached on the way from one that can to one that cannot.
+
+    Args:
+        generator: Fitted.
+        within: That can be reached.
+        wanted: That cannot.
+        check: Of a goal's plan.
+        said: A goal as it is said, rounded: what is said is what can be reached.
+    """
+    low, high, last = 0.0, 1.0, within
     for _ in range(_HALVINGS):
         share = (low + high) / 2
-        if refusal(generator, within + share * (wanted - within), check):
+        goal = said(within + share * (wanted - within))
+        if refusal(generator, goal, check):
             high = share
         else:
-            low = share
-    return np.asarray(within + low * (wanted - within))
+            low, last = share, goal
+    return np.asarray(last)
 
 
 def region_around(demonstrations: Demonstrations) -> Float[np.ndarray, "2 k"]:

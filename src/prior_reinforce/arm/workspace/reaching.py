@@ -22,7 +22,7 @@ from prior_reinforce.generators.reach import (
 from prior_reinforce.parsing import as_place
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.symmetry import Polar, Symmetry, find_axis, hand_paths
-from prior_reinforce.wording import say_place
+from prior_reinforce.wording import in_words, say_place
 
 if TYPE_CHECKING:
     from prior_reinforce.arm.workspace.workspace import Workspace
@@ -43,13 +43,17 @@ def require_reach(workspace: Workspace, goal: ArrayLike) -> None:
     if shown.symmetry is None:
         return
     generator, check = workspace.model, reach_check(workspace)
+
+    def said(goal: Point) -> Point:
+        return as_place(say_place(goal, form), form) if in_words(form) else goal
+
     if why := refusal(generator, place, check):
         straight = _same_direction(shown, shown.symmetry, place)
         if refusal(generator, straight, check):
             possible = reach(generator, goals_around(shown), check)
-            nearest = possible.nearest(generator, place, check)
+            nearest = possible.nearest(generator, place, check, said)
         else:
-            nearest = farthest_between(generator, straight, place, check)
+            nearest = farthest_between(generator, straight, place, check, said)
         raise OutOfReachError(
             f"goal {say_place(place, form)} is out of reach: {why}; the nearest that can be "
             f"reached is {say_place(nearest, form)}; demonstrate closer to the goal"
