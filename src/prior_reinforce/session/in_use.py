@@ -193,7 +193,8 @@ class InUse:
                 said = f"{error}; trial {n} went as far as passes, and missed: {nearer}"
                 raise RobotLimitError(said) from error
             (plan,) = generator.generate(nearest[None])
-            limited = f"moved only as far as passes, which may not do ({error.__cause__}); {nearer}"
+            why = str(error.__cause__).split(". ")[0]
+            limited = f"moved only as far as passes, which may not do ({why}); {nearer}"
             return nearest, plan, verdict_on(plan, nearest, ""), limited
         if verdict is not None and (n := _missed(state, wanted)):
             expected = self.expected(state, wanted)
