@@ -29,8 +29,8 @@ from prior_reinforce.wording import (
     TIME_WORDS,
     WORDS,
     bare_unit,
-    error_example,
     error_words,
+    say_unread,
 )
 
 _LEAST_BARE_CM = 0.1
@@ -57,7 +57,6 @@ _NUMBER = r"\d{1,6}(?:\.\d*)?|\.\d+"
 _LENGTHS = "|".join(re.escape(each) for each, unit in SPELT.items() if kind_of(unit) == "length")
 _BARE_TERM = re.compile(rf"(?P<value>{_NUMBER})\s*(?P<unit>{_LENGTHS})")  # `92cm`
 _SYNONYMS = {"far": "long", "beyond": "long", "above": "high", "below": "low"}
-_FROM_BASE = re.compile(r"(?P<length>.*?)\s*(?:away )?from (?:the )?(?:base|robot|arm|foot)\b.*")
 _WITH_COMMA = re.compile(r"[+-]?\d+(?:[.,]\d+)?")
 _THOUSAND = re.compile(r"(?<![\d.,])[1-9]\d{0,2},\d{3}(?![\d.])")
 
@@ -201,7 +200,10 @@ def as_reading(
         reading = seen
     else:
         reading = Reading.estimated(as_bare_error(seen, goal, form), form.least_sd)
-    return reading.with_hit(hit)
+    reading = reading.with_hit(hit)
+    if reading.hit is None and not reading.has_number:
+        raise InvalidFeedbackError(f'"{reading.said}" says nothing of where it went; say lost')
+    return reading
 
 
 def as_bare_error(
@@ -390,7 +392,7 @@ def _terms(
         elif found.get("word") not in known or (
             place and (not found["value"] or found["sd"] or found["least"])
         ):
-            raise InvalidFeedbackError(_unread(part, text, [*known], form, place))
+            raise InvalidFeedbackError(say_unread(part, text, [*known], form, place))
         else:
             j, pair = known[found["word"]]
         if j in terms:
@@ -434,16 +436,3 @@ def _in_unit(number: str, stated: str, unit: str, k: int, part: str) -> float:
     if scale is None:
         raise InvalidFeedbackError(f"{part!r} is to be in {unit}; say that unit")
     return value * scale
-
-
-def _unread(part: str, text: str, known: Sequence[str], form: OutcomeFormat, place: bool) -> str:
-    """Message for a part that cannot be read."""
-    if place and (from_base := _FROM_BASE.fullmatch(part)):
-        return (
-            f"{part!r} may be straight to the place or along x only; measure along x and say "
-            f"{from_base['length']} {known[0]}"
-        )
-    example = "92cm ahead, 10cm left" if place else error_example(form)
-    said = f', for instance "{example}"' * bool(example) + ', or "hit"' * (not place)
-    where = "" if part == text.strip().lower() else f" in {text!r}"
-    return f"cannot read {part!r}{where}; write a length and one of {', '.join(known)}{said}"

@@ -17,6 +17,7 @@ Source: paper, Section IV, "Perception Process" (coarse human feedback); the wor
 from __future__ import annotations
 
 import html
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -39,6 +40,7 @@ CHANCES = (0.0, 0.1), (0.1, 0.65), (0.65, 1.0)
 _FEW_TRIALS = 10
 """Beyond, the number is a guess, and is not said (ours)."""
 _EXAMPLE_LENGTHS = ("5cm", "2cm", "1cm")
+_FROM_BASE = re.compile(r"(?P<length>.*?)\s*(?:away )?from (?:the )?(?:base|robot|arm|foot)\b.*")
 _EXAMPLES = {"time": "20ms", "angle": "5deg"}
 
 
@@ -133,6 +135,19 @@ def error_example(form: OutcomeFormat) -> str:
         if pair and (example := _example(j, unit, form.outcome_dim))
     ]
     return ", ".join(said) if len(said) == form.outcome_dim else ""
+
+
+def say_unread(part: str, text: str, known: Sequence[str], form: OutcomeFormat, place: bool) -> str:
+    """Say that a part of a text cannot be read, and what may stand there: one of `known`."""
+    if place and (from_base := _FROM_BASE.fullmatch(part)):
+        return (
+            f"{part!r} may be straight to the place or along x only; measure along x and say "
+            f"{from_base['length']} {known[0]}"
+        )
+    example = "92cm ahead, 10cm left" if place else error_example(form)
+    said = f', for instance "{example}"' * bool(example) + ', or "hit"' * (not place)
+    where = "" if part == text.strip().lower() else f" in {text!r}"
+    return f"cannot read {part!r}{where}; write a length and one of {', '.join(known)}{said}"
 
 
 def _example(j: int, unit: str, k: int) -> str:

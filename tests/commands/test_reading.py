@@ -65,6 +65,7 @@ def test_an_error_can_be_told_in_many_ways(run, folder, said, seen):
         (("--outcome", "0.9"), "needs 2 numbers"),
         (("--outcome", "0.9+-0.1", "0.1+-0.1"), "is not 2 finite numbers"),
         (("--outcome", "there"), "cannot read 'there'"),
+        (("somewhere",), '"somewhere" says nothing of where it went; say lost'),
         (("--hit", "--miss"), "one of those alone"),
     ],
 )
@@ -85,6 +86,7 @@ def test_what_cannot_be_told_is_one_line_and_changes_nothing(run, folder, said, 
         (("0.05+-0.003", "-0.02+-0.001"), [0.05, -0.02], [0.05, -0.02], [0.003, 0.001]),
         (("0.05", "+-", "0.003,", "0", "±", "0.001"), [0.05, 0.0], [0.05, 0.0], [0.003, 0.001]),
         (("long, somewhere",), [0.01, -np.inf], [np.inf, np.inf], [0.0, 0.0]),
+        (("0 long, somewhere",), [-0.01, -np.inf], [0.01, np.inf], [0.0, 0.0]),
         (("--miss",), [-np.inf] * 2, [np.inf] * 2, [0.0, 0.0]),
     ],
 )

@@ -348,7 +348,9 @@ class Session:
         hit: bool | None,
     ) -> None:
         reading = as_reading(seen, hit, goal.goal, goal.format)
-        reached = goal.is_hit(reading.error_seen) if reading.hit is None else reading.hit
+        # Where a component is open, nobody knows.
+        near = goal.is_hit(reading.error_seen) and np.isfinite(reading.spread).all()
+        reached = near if reading.hit is None else reading.hit
         self.log.append(event(trial=trial.number, reading=reading.record(), hit=bool(reached)))
 
     def informed_adapter(self) -> Adapter:
