@@ -232,6 +232,22 @@ def test_one_box_for_both_objects_gives_no_number(wide):
     assert "one box for both" in reading.problem
 
 
+class Exchanges(ColourClient):
+    """Gives the ring's box for the ball, and the ball's for the ring."""
+
+    def ask(self, words, picture):
+        other = SCENE.goal if words == SCENE.reached.words else SCENE.reached
+        return super().ask(other.words, picture)
+
+
+def test_two_objects_that_are_exchanged_give_no_number(wide):
+    picture, calibration = wide
+    with VisionLanguageModel(SCENE, client=Exchanges("glm-4.5v"), calibration=calibration) as eye:
+        reading = eye.read(picture)
+    assert reading.error_seen is None
+    assert "fit only with the orange ball and the red ring exchanged" in reading.problem
+
+
 LOOSE = [((1, 1), (1, 1)), ((1.2, 1.2), (1.2, 1.2)), ((0.85, 1.15), (1.1, 0.9))]
 
 

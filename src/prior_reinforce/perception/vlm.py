@@ -181,6 +181,15 @@ class VisionLanguageModel(Perception):
         swapped = [_misfit(self._swapped(box, wide / tall), calibration, s) for box, s in found]
         if _fits_better(swapped, read):
             return replace(goal, place=None, problem=f"both boxes fit {self._other_order()}")
+        exchanged = [_misfit(reached.box, calibration, found[1][1])]
+        exchanged += [_misfit(goal.box, calibration, found[0][1])]
+        if _fits_better(exchanged, read):
+            return replace(
+                goal,
+                place=None,
+                problem=f"both boxes fit only with {reached.words} and {goal.words} exchanged: "
+                "does the model take one for the other, are the sizes right?",
+            )
         small, large, flat = np.array([_against(box, calibration, size) for box, size in found]).T
         if small.max() < _TOO_SMALL and _alike(*small):
             seen = f"{small[0]:.2f} and {small[1]:.2f} times as large as they are"
@@ -322,7 +331,7 @@ def _misfit(box: Box, calibration: TableCalibration, size: float) -> float:
 
 
 def _fits_better(swapped: list[float], read: list[float]) -> bool:
-    """Whether boxes fit with x and y swapped, each better by more than boxes are drawn loosely.
+    """Whether boxes fit swapped or exchanged, each better by more than boxes are drawn loosely.
 
     Both are misfits.
     """
