@@ -492,6 +492,29 @@ def test_a_goal_that_is_seen_far_from_the_one_that_is_set_is_no_reading(drawn_ta
     assert "tell" not in said.out
 
 
+@pytest.mark.parametrize(
+    ("flip", "goal", "how"),
+    [
+        (Image.Transpose.ROTATE_180, [0.85, 0.05], "turned by half a turn"),
+        (Image.Transpose.FLIP_LEFT_RIGHT, [0.85, 0.05], "mirrored"),
+    ],
+)
+def test_a_picture_that_is_turned_or_mirrored_is_no_reading(drawn_table, capsys, flip, goal, how):
+    with Workspace.create(drawn_table / "hoop", manifest()) as workspace:
+        workspace.import_demonstrations(demonstrations(), "made up")
+        workspace.learn("interpolation")
+        workspace.set_goal(goal)
+        workspace.session().ask()
+    drawn(drawn_table / "photo.png", hoop=goal)
+    Image.open(drawn_table / "photo.png").transpose(flip).save(drawn_table / "photo.png")
+    of_trial = ("--workspace", str(drawn_table / "hoop"), "--trial", "1")
+    with VisionServer() as server:
+        assert look(drawn_table, server.base_url, *of_trial) == 1
+    said = capsys.readouterr()
+    assert f"in the picture {how} it would be seen 0" in said.err
+    assert "tell" not in said.out
+
+
 def test_which_model_looks_may_stand_in_the_workspaces_manifest(drawn_table, capsys):
     with Workspace.create(drawn_table / "hoop", manifest()) as workspace:
         workspace.import_demonstrations(demonstrations(), "made up")

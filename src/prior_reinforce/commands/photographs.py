@@ -28,7 +28,7 @@ from prior_reinforce.wording import to_words
 
 if TYPE_CHECKING:
     from prior_reinforce.perception.calibration import TableCalibration
-    from prior_reinforce.perception.vlm_reading import Sighting
+    from prior_reinforce.perception.vlm_reading import PictureReading, Sighting
 
 _COLUMNS = ("x", "y", "u", "v")
 _COARSE = 0.02
@@ -47,6 +47,9 @@ _SAME_GOAL, _OTHER_GOAL = 0.02, 0.15
 """By how far what stands at the goal may be seen from it, in [m], without a warning; from where on
 the picture or its reading is another one than is thought. Ours: twice a camera's error, and
 farther than anybody misplaces a hoop."""
+_FLIPPED = 3 * _SAME_GOAL
+"""From how far beside the goal it is asked, in [m], whether the picture is turned or mirrored; ours:
+a hoop that stands nearer may be misplaced beside the picture's middle."""
 
 
 @dataclass(frozen=True)
@@ -222,6 +225,14 @@ class Look:
                 )
                 failed.changed = True
                 raise failed
+            off, how = _flipped(here, reading, goal)
+            if moved > _FLIPPED and off <= max(_SAME_GOAL, 3 * here.sd):
+                failed = PerceptionFailedError(
+                    f"{says}in the picture {how} it would be seen {100 * off:.1f} cm from it: is "
+                    "the photograph as the camera took it when it was calibrated?"
+                )
+                failed.changed = True
+                raise failed
             if moved > _SAME_GOAL:
                 warn(f"{says}check the calibration, or move it there")
         print(f"seen: {to_words(error)}   boxes: {drawn}")
@@ -248,6 +259,18 @@ class Look:
                 )
             goal = state.goal_of(state.trial(self.trial)).goal
         return goal, folder / "pictures", f"trial-{self.trial:03d}-seen"
+
+
+def _flipped(here: TableCalibration, reading: PictureReading, goal: Point) -> tuple[float, str]:
+    """How near the goal, in [m], its object is seen in the picture turned or mirrored, and how."""
+    assert reading.goal is not None
+    assert reading.goal.place is not None
+    assert reading.goal_place is not None
+    (u, v), (tall, wide) = here.to_pixels(reading.goal.place), reading.picture.shape[:2]
+    flips = {"turned by half a turn": (wide - u, tall - v), "mirrored": (wide - u, v)}
+    offset = reading.goal_place - reading.goal.place
+    offs = {how: here.to_table(np.array(at)) + offset - goal for how, at in flips.items()}
+    return min((float(np.linalg.norm(off)), how) for how, off in offs.items())
 
 
 def _beyond(calibration: TableCalibration, sighting: Sighting) -> tuple[float, float]:
