@@ -478,6 +478,14 @@ def test_what_is_told_is_no_surer_than_the_calibration(drawn_table, capsys, run)
     assert seen(capsys.readouterr().out)[1] > 0.02
 
 
+def test_four_points_tell_no_spread(drawn_table, capsys, run):
+    points_file(drawn_table / "points.csv", np.array(POINTS)[[0, 2, 3, 5]].tolist())
+    run("calibrate", drawn_table / "points.csv", "--out", drawn_table / "table.json")
+    with VisionServer() as server:
+        assert look(drawn_table, server.base_url) == 0
+    assert "too few to tell how well it fits: +-0.3 cm is without" in capsys.readouterr().err
+
+
 def test_a_goal_that_is_seen_far_from_the_one_that_is_set_is_no_reading(drawn_table, capsys):
     with Workspace.create(drawn_table / "hoop", manifest()) as workspace:
         workspace.import_demonstrations(demonstrations(), "made up")

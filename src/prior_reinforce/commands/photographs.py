@@ -48,8 +48,8 @@ _SAME_GOAL, _OTHER_GOAL = 0.02, 0.15
 the picture or its reading is another one than is thought. Ours: twice a camera's error, and
 farther than anybody misplaces a hoop."""
 _FLIPPED = 3 * _SAME_GOAL
-"""From how far beside the goal it is asked, in [m], whether the picture is turned or mirrored; ours:
-a hoop that stands nearer may be misplaced beside the picture's middle."""
+"""From how far beside the goal, in [m], a picture may be turned or mirrored; ours: nearer, a hoop
+may be misplaced beside the picture's middle."""
 
 
 @dataclass(frozen=True)
@@ -190,6 +190,11 @@ class Look:
                 "then, both errors' signs are wrong: save both as PNG, and calibrate again"
             )
         here = calibration.in_picture((picture.shape[1], picture.shape[0]))
+        if here.left_out_error is None:
+            warn(
+                "the calibration's points are too few to tell how well it fits: "
+                f"+-{100 * here.sd:.1f} cm is without a wrong point; give one point more"
+            )
         if here is not calibration:
             warn("the picture has another size than that of the calibration, and is scaled to it")
         with VisionLanguageModel(scene, model_of(self.vlm, around), calibration=here) as model:
