@@ -145,6 +145,12 @@ def test_a_person_at_the_terminal_is_asked_which_link_is_the_flange(run, tmp_pat
         assert workspace.manifest.robot.joint_names == ("a", "b", "wrist")
 
 
+@pytest.mark.parametrize("robot", ["none", "panda"])
+def test_where_no_motion_is_turned_no_box_is_wanted_anyway(run, tmp_path, robot):
+    status, _, err = run("new", tmp_path / "w", "--robot", robot, "--no-box")
+    assert (status, err) == (0, "")
+
+
 @pytest.mark.parametrize("held", ["lift", "lift=high", "=0.2", "lift=nan"])
 def test_a_joint_is_held_somewhere(run, tmp_path, held):
     status, _, err = run("new", tmp_path / "w", "--robot", "arm.urdf", "--hold", held)

@@ -305,7 +305,7 @@ class _Reader:
             why = (
                 "a turned motion sweeps other parts of the room: give the tool tip's box in [gate] "
             )
-            why += f"({', '.join(_BOX.values())}; `new --box`), or say no_box = true (`--no-box`)"
+            why += f"({', '.join(_BOX.values())}; `new --box`), or no_box = true here (`--no-box`)"
             raise self.error("symmetry", "object", why)
         return made
 

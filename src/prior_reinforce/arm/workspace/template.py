@@ -159,8 +159,8 @@ class NewWorkspace:
             said["object"] = json.dumps(where)
             if len(self.outcome_names) > 2:  # tempo and amplitude move x and y alone
                 said["distance"] = '"learned"'
-        if self.no_box:
-            said["no_box"] = "true"
+            if self.no_box:  # else nothing asks for a box
+                said["no_box"] = "true"
         for key, value in said.items():
             text = re.sub(rf"^# {key} = \S.*?(?=\s*(#|$))", f"{key} = {value}", text, flags=re.M)
         return text
