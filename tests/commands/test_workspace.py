@@ -151,6 +151,13 @@ def test_where_no_motion_is_turned_no_box_is_wanted_anyway(run, tmp_path, robot)
     assert (status, err) == (0, "")
 
 
+def test_an_sdf_is_said_to_be_none_that_is_read(run, tmp_path):
+    (tmp_path / "arm.sdf").write_text("<sdf/>")
+    status, _, err = run("new", tmp_path / "w", "--robot", tmp_path / "arm.sdf")
+    assert status == 2
+    assert "arm.sdf: SDF is not read; give the URDF" in err
+
+
 @pytest.mark.parametrize("held", ["lift", "lift=high", "=0.2", "lift=nan"])
 def test_a_joint_is_held_somewhere(run, tmp_path, held):
     status, _, err = run("new", tmp_path / "w", "--robot", "arm.urdf", "--hold", held)

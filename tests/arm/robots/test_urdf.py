@@ -203,13 +203,14 @@ def test_a_urdf_that_lacks_a_character_is_refused_or_is_the_same_arm(tmp_path):
             '<axis xyz="0 0 nan"/>',
             "joint a has <axis.*3 finite",
         ),
-        ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 10"/>', "joint a needs an axis of length 1"),
+        ('<axis xyz="0 0 1"/>', '<axis xyz="0 9 1"/>', "joint a needs an axis of length 1"),
         ('<origin xyz="0 0 0.333" rpy="0 0 0"/>', "", "joint a has no <origin>"),
         ("0 0 0.333", "0 0 1e999", "give 3 finite numbers"),
         ("0 0 0.333", "0 0 ${height}", "give 3 finite numbers"),
         ("0 0 0.333", "0 0 333", "joint a has an <origin> beyond 10 m or a turn"),
         ('velocity="2"', 'velocity="200"', "joint a has a velocity limit of 200"),
-        ('upper="2.25"', 'upper="225"', "joint a has no range within 12.57 rad"),
+        ('upper="2.25"', 'upper="225"', "12.57 rad: -1.5 to 225, in degrees\\?;"),
+        ('upper="2.25"', 'upper="-3"', "12.57 rad: -1.5 to -3, exchanged\\?;"),
         ('velocity="2"', 'velocty="2"', "joint a has an unknown velocty in <limit>"),
         ("<axis", "axis", "text in joint base"),
         ('<axis xyz="0 0 1"/>', '<axs xyz="0 0 1"/>', "joint base has an unknown <axs>"),
@@ -233,6 +234,13 @@ def test_what_is_wrong_in_a_urdf_is_named(tmp_path, old, new, says):
     path.write_text(text[:at] + new + text[at + len(old) :])
     with pytest.raises((FileFormatError, ConfigurationError), match=says):
         read_urdf(path, "tool0")
+
+
+def test_an_axis_of_another_length_has_its_direction_where_it_is_along_one(tmp_path):
+    path = write_urdf(tmp_path / "a.urdf", SMALL)
+    text = path.read_text()
+    path.write_text(text.replace('xyz="0 0 1"', 'xyz="0 0 2"'))
+    assert read_urdf(path, "tool0").chain.axes[0] == (0.0, 0.0, 1.0)
 
 
 def test_links_that_no_arm_has_are_in_another_unit(tmp_path):

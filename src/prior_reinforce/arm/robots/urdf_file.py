@@ -64,6 +64,8 @@ def read_joints(path: Path) -> tuple[str, list[Joint], list[str], dict[str, str]
     """
     if not path.is_file():
         raise FileFormatError(f"no URDF at {path}; give the path of a .urdf file")
+    if path.name.lower().endswith(".sdf"):
+        raise FileFormatError(f"{path}: SDF is not read; give the URDF of the arm")
     if path.name.endswith(".xacro"):
         raise FileFormatError(f"{path} is a xacro; make a URDF of it: xacro {path} > arm.urdf")
     try:
@@ -186,7 +188,9 @@ class Joint:
         """About which it turns."""
         x, y, z = self.vector("axis", "xyz")
         length = math.hypot(x, y, z)
-        if abs(length - 1) > _LENGTH_OF_AXIS:
+        # A slip in the length of an axis along x, y or z leaves its direction.
+        along = sum(each != 0 for each in (x, y, z)) == 1
+        if abs(length - 1) > _LENGTH_OF_AXIS and not along:
             has = (
                 f"its <axis> has {length:.3g}"
                 if "axis" in self.parts
@@ -215,8 +219,14 @@ class Joint:
             low = low if soft[0] is None else max(low, soft[0])
             high = high if soft[1] is None else min(high, soft[1])
         if low is None or high is None or not -ENDLESS <= low < high <= ENDLESS:
+            why = ""
+            if low is not None and high is not None:
+                beyond = max(abs(low), abs(high)) > ENDLESS
+                why = f": {low:g} to {high:g}"
+                why += ", in degrees?" * beyond + ", exchanged?" * (low > high)
             raise self.error(
-                f"has no range within {ENDLESS:.4g} rad; write lower and upper into its <limit>"
+                f"has no range within {ENDLESS:.4g} rad{why}; write lower and upper into its "
+                "<limit>, in rad"
             )
         return low, high, velocity
 

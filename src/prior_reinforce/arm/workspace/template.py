@@ -78,7 +78,7 @@ class NewWorkspace:
         """
         robot = self.robot
         known = robot if isinstance(robot, str) else robot.robot
-        is_file = known.lower().endswith((".urdf", ".xml", ".xacro"))
+        is_file = known.lower().endswith((".urdf", ".xml", ".xacro", ".sdf"))
         if not is_file and (self.tip, self.base, self.hold) != (None, None, ()):
             raise ConfigurationError(
                 f"--tip, --base and --hold are of a URDF, and --robot is {known}; drop them"
