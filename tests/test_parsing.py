@@ -104,8 +104,25 @@ def test_a_mere_direction_stands_for_five_centimetres():
 
 
 def test_what_cannot_be_read_is_named_once():
-    with pytest.raises(InvalidFeedbackError, match=r"^cannot read 'a bit long'; write"):
+    with pytest.raises(
+        InvalidFeedbackError, match=r"^cannot read 'a bit long': it has 'a',.*; write"
+    ):
         from_words("A bit long", METRES)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("2 feet long", "it has 'feet', which is no unit (m, cm, mm, in)"),
+        ("half a metre short", "it has 'half', which is no unit"),
+        ("between 3 and 5 cm long", "it has 'between'"),
+        ("5cm wide", "it has 'wide', which is no unit .* and no direction"),
+        ("1/2 in long", "write 0.5 for 1/2"),
+    ],
+)
+def test_the_word_that_is_not_known_is_named(words, says):
+    with pytest.raises(InvalidFeedbackError, match=says.replace("(", r"\(").replace(")", r"\)")):
+        from_words(words, METRES)
 
 
 def test_hit_and_miss_exclude_each_other():

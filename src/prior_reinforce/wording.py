@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.readings import Reading
 from prior_reinforce.terminal import plain
-from prior_reinforce.units import UNITS, kind_of, spoken
+from prior_reinforce.units import SPELT, UNITS, kind_of, spoken
 
 WORDS: tuple[tuple[str, str], ...] = (("long", "short"), ("left", "right"), ("high", "low"))
 """For x, y and z of an error: the word where it is positive, the word where it is negative."""
@@ -147,6 +147,21 @@ def say_unread(part: str, text: str, known: Sequence[str], form: OutcomeFormat, 
     example = "92cm ahead, 10cm left" if place else error_example(form)
     said = f', for instance "{example}"' * bool(example) + ', or "hit"' * (not place)
     where = "" if part == text.strip().lower() else f" in {text!r}"
+    unknown = [
+        word
+        for word in re.findall(r"[^\W\d_]+", part)
+        if word not in (*known, *SPELT, *form.units, "to", "the", "by")
+    ]
+    if unknown:
+        kinds = {kind_of(unit) for unit in form.units}
+        units = dict.fromkeys([*(each for each in UNITS if kind_of(each) in kinds), *form.units])
+        said_units = ", ".join(unit for unit in units if unit != "1")
+        where += f": it has {unknown[0]!r}, which is no unit" + f" ({said_units})" * bool(
+            said_units
+        )
+        where += " and no direction"
+    elif "/" in part:
+        where += ": write 0.5 for 1/2"
     return f"cannot read {part!r}{where}; write a length and one of {', '.join(known)}{said}"
 
 
