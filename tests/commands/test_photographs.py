@@ -67,7 +67,11 @@ def test_calibrate_replaces_only_what_it_wrote(tmp_path, run):
 @pytest.mark.parametrize(
     ("scale", "flags", "says"),
     [
-        (100, (), "100 m away looks like centimetres; write x [cm] and y [cm]"),
+        (
+            100,
+            (),
+            "100 m away looks like centimetres; write x [cm] and y [cm] in the head (inches: [in])",
+        ),
         (1200, (), "1200 m away looks like millimetres; write x [mm] and y [mm]"),
         (1, ("--height", "nan"), "--height must be metres"),
         (1, ("--height", "10"), "--height must be metres"),

@@ -88,7 +88,7 @@ class Calibrate:
         if looks := looks_like("m", np.abs(table_points).max(initial=0.0)):
             raise ConfigurationError(
                 f"a point {np.abs(table_points).max():g} m away looks like {UNITS[looks].plural}; "
-                f"write x [{looks}] and y [{looks}] in the head, or metres"
+                f"write x [{looks}] and y [{looks}] in the head (inches: [in]), or metres"
             )
         size = None
         if self.picture is not None:
