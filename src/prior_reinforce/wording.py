@@ -156,10 +156,8 @@ def say_unread(part: str, text: str, known: Sequence[str], form: OutcomeFormat, 
         kinds = {kind_of(unit) for unit in form.units}
         units = dict.fromkeys([*(each for each in UNITS if kind_of(each) in kinds), *form.units])
         said_units = ", ".join(unit for unit in units if unit != "1")
-        where += f": it has {unknown[0]!r}, which is no unit" + f" ({said_units})" * bool(
-            said_units
-        )
-        where += " and no direction"
+        listed = f" ({said_units})" if said_units else ""
+        where += f": it has {unknown[0]!r}, which is no unit{listed} and no direction"
     elif "/" in part:
         where += ": write 0.5 for 1/2"
     return f"cannot read {part!r}{where}; write a length and one of {', '.join(known)}{said}"

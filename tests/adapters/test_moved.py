@@ -198,6 +198,17 @@ def test_what_is_read_after_a_loss_takes_it_back_until_the_object_is_lost_again(
     assert arm.adapter.expect(condition, goal, 0.015).nearer
 
 
+def test_after_two_losses_in_a_row_plans_stay_nearer_than_those_lost():
+    arm, goal = Arm(off=(-0.1, 0.0)), np.array([1.1, 0.1])
+    lost, aims = Reading.only(False, 2, lost=True), list[float]()
+    for _ in range(2):
+        condition = arm.adapter.propose(goal)
+        arm.adapter.observe(condition, goal, lost)
+        aims.append(float(np.linalg.norm(condition)))
+    arm.throw(goal)
+    assert np.linalg.norm(arm.adapter.propose(goal)) < min(aims)
+
+
 SIX = np.array(
     [
         [0.90, -0.20, 0.50],

@@ -19,6 +19,9 @@ from prior_reinforce.files import open_npz
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import Reading
 
+_STATE = 2
+"""Counts up where what `state` gives changes: states of before are not resumed."""
+
 
 @dataclass(frozen=True, eq=False)
 class Expectation:
@@ -121,7 +124,8 @@ class Adapter(ABC):
         """Return `key` as it is after `start`, without starting."""
         import prior_reinforce
 
-        what = type(self).__qualname__, prior_reinforce.__version__, getattr(self, "config", None)
+        version = prior_reinforce.__version__, _STATE
+        what = type(self).__qualname__, version, getattr(self, "config", None)
         return next_key("", f"{what} {demonstrations.sha256}")
 
     @property

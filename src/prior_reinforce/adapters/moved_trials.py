@@ -202,7 +202,7 @@ class MovedTrials:
         None where it was lost once and read since: nobody knows what that loss was.
         """
         losses = [(aim, at) for about, aim, at in self._lost if np.array_equal(about, goal)]
-        memory, again = self.belief.memory, len({at for _, at in losses}) > 1
+        memory, again = self.belief.memory, len(losses) > 1
         of_goal = np.all(memory.goals == goal, axis=1)
         since = of_goal & (memory.numbers >= max((at for _, at in losses), default=0))
         if not again and np.any(since):

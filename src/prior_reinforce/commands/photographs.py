@@ -231,7 +231,7 @@ class Look:
                 failed.changed = True
                 raise failed
             off, how = _flipped(here, reading, goal)
-            if moved > _FLIPPED and off <= max(_SAME_GOAL, 3 * here.sd):
+            if moved > _FLIPPED and off <= min(max(_SAME_GOAL, 3 * here.sd), moved / 3):
                 failed = PerceptionFailedError(
                     f"{says}in the picture {how} it would be seen {100 * off:.1f} cm from it: is "
                     "the photograph as the camera took it when it was calibrated?"

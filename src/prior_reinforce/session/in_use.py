@@ -123,7 +123,7 @@ class InUse:
             expected_trials=None if expected is None else expected.trials,
             expected_error=None if expected is None else _as_list(expected.error),
             expected_sd=None if expected is None else _as_list(expected.sd),
-            remark=limited or self._remark(state, expected),
+            remark="; ".join(filter(None, (limited, self._remark(state, expected)))),
         )
 
     def _remark(self, state: State, expected: Expectation | None) -> str:
@@ -195,7 +195,12 @@ class InUse:
             (plan,) = generator.generate(nearest[None])
             why = str(error.__cause__).split(". ")[0]
             limited = f"moved only as far as passes, which may not do ({why}); {nearer}"
-            return nearest, plan, verdict_on(plan, nearest, ""), limited
+            return (
+                nearest,
+                plan,
+                verdict_on(plan, nearest, self.say_no_plan(state, nearest)),
+                limited,
+            )
         if verdict is not None and (n := _missed(state, wanted)):
             expected = self.expected(state, wanted)
             if expected is not None and expected.beyond:

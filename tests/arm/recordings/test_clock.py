@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.arm.recordings.clock import clock_of, counts_down, declared_rate, skips_frames
+from prior_reinforce.arm.recordings.clock import (
+    clock_of,
+    counts_down,
+    declared_rate,
+    skips_frames,
+    tells_time,
+)
 from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
@@ -180,11 +186,26 @@ def test_a_time_that_counts_down_is_named(rate):
     assert not counts_down("t", -left)
 
 
-def test_a_rate_that_contradicts_the_name_of_a_recording_is_refused():
-    assert clock_of("throw_0_100Hz", 3, rate=100.0).period == pytest.approx(0.01)
-    says = "--rate 100, but the name of episode throw_4_50Hz says 50Hz: import .* --append"
-    with pytest.raises(ConfigurationError, match=says):
-        clock_of("throw_4_50Hz", 3, rate=100.0)
+def test_a_rate_that_contradicts_the_name_of_a_recording_is_said():
+    assert clock_of("throw_0_100Hz", 3, rate=100.0).source == "the given rate"
+    clock = clock_of("throw_4_12,5Hz", 3, rate=100.0)
+    assert clock.source == "the given rate (the name throw_4_12,5Hz says 12.5 Hz)"
+    assert clock.period == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("rate", [200, 1000])
+def test_nanoseconds_since_2000_are_no_ticks(rate):
+    stamps = 641_000_000_000_000_000 + np.arange(rate) * (1_000_000_000 // rate)
+    clock = clock_of("a", rate, stamps=stamps, name="timestamp", time_unit="ns")
+    assert clock.period == pytest.approx(1 / rate, rel=1e-3)
+    assert not tells_time("n", stamps)
+
+
+def test_a_stated_unit_is_believed_of_ticks():
+    ticks = 638_000_000_000_000_000 + np.arange(200) * 100_000
+    assert clock_of("a", 200, stamps=ticks, name="n").period == pytest.approx(0.01, rel=1e-3)
+    clock = clock_of("a", 200, stamps=ticks, name="n", time_unit="us")
+    assert clock.period == pytest.approx(0.1, rel=1e-3)
 
 
 def test_a_rate_settles_the_unit_of_times():

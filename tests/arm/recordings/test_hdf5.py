@@ -321,6 +321,17 @@ def test_packed_numbers_are_unpacked(tmp_path):
     (read,) = read_recordings(tmp_path, key="q")
     np.testing.assert_allclose(read.positions, q, atol=6e-5)
     with h5py.File(tmp_path / "0.h5", "a") as file:
+        file["q"].attrs["_FillValue"] = file["q"][3, 0]
+    (read,) = read_recordings(tmp_path, key="q")
+    assert np.isnan(read.positions[3, 0])
+    assert np.isfinite(read.positions).any()
+    with h5py.File(tmp_path / "0.h5", "a") as file:
         file["q"].attrs["scale_factor"] = "1e-4"
-    with pytest.raises(FileFormatError, match=r"q is packed by .*scale_factor.*unpack it"):
+    with pytest.raises(FileFormatError, match=r"q \(int16\) says scale_factor = 1e-4, .*unpacked"):
+        read_recordings(tmp_path, key="q")
+    with h5py.File(tmp_path / "0.h5", "a") as file:
+        del file["q"]
+        file["q"] = q
+        file["q"].attrs["scale_factor"] = 1e-4  # applied already, or not?
+    with pytest.raises(FileFormatError, match=r"q \(float64\) says scale_factor = 0\.0001"):
         read_recordings(tmp_path, key="q")

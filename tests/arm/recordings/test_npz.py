@@ -290,3 +290,17 @@ def test_an_array_a_throw_is_an_episode_each(tmp_path):
         np.testing.assert_array_equal(recording.positions, own[recording.episode])
     (one,) = read_recordings(tmp_path / "throws.npz", key="throw_1")
     np.testing.assert_array_equal(one.positions, own["throw_1"])
+
+
+def test_arrays_beside_a_motion_are_no_throws_and_outcomes_go_with_their_throw(tmp_path):
+    own = {f"throw_{i}": sampled(i, 100)[1] for i in range(2)}
+    outcomes = np.array([[1.0, 0.1], [1.2, 0.2]])
+    np.savez(tmp_path / "throws.npz", **own, dt=0.01, outcomes=outcomes)
+    for recording, outcome in zip(read_recordings(tmp_path / "throws.npz"), outcomes, strict=True):
+        np.testing.assert_array_equal(recording.outcome, outcome)
+    np.savez(tmp_path / "throws.npz", **own, dt=0.01, outcomes=outcomes[:1])
+    with pytest.raises(FileFormatError, match="outcomes needs a row for each of throw_0, throw_1"):
+        read_recordings(tmp_path / "throws.npz")
+    np.savez(tmp_path / "throws.npz", **own, dt=0.01, q=own["throw_1"])
+    (read,) = read_recordings(tmp_path / "throws.npz")
+    assert read.episode == "throws"

@@ -12,7 +12,8 @@ def test_the_seconds_of_a_time_are_no_number_of_an_episode():
     assert digits_at_end("2024-05-03") == digits_at_end("log_2024-05-03_1402") == ""
     assert digits_at_end("2024-05-03_demo_003") == digits_at_end("2024-05-03_3") == "3"
     assert digits_at_end("throw_03.05.2024") == ""
-    assert digits_at_end("log_10-10-03") == digits_at_end("log_10_10_03.250") == ""
+    assert digits_at_end("log_10-10-03") == digits_at_end("log_10-10-03.250") == ""
+    assert digits_at_end("s01_02_03") == "3"
     assert digits_at_end("2-01-03") == digits_at_end("set-10_11-3") == "3"
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from prior_reinforce.arm.recordings import import_demonstrations
+from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
 from prior_reinforce.arm.recordings.outcomes import (
     Outcomes,
     check_rows,
@@ -457,3 +457,10 @@ def test_two_numbers_that_fit_all_rows_are_refused_until_rows_are_called_by_the_
     with pytest.raises(InvalidDemonstrationsError, match=r"throw_1_take2 may be row 1 or row 2: "):
         paired(names, ["1", "2"])
     assert paired(names, names[::-1]) == names
+
+
+def test_a_recording_whose_rows_are_counted_is_no_table_of_outcomes(tmp_path):
+    for i in range(2):
+        rows = [f"{k / 10},{k},{np.sin(k / 4 + i)}" for k in range(20)]
+        (tmp_path / f"throw_{i}.csv").write_text("\n".join(["t,take,joint1", *rows]))
+    assert len(read_recordings(tmp_path)) == 2

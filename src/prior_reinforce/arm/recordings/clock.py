@@ -44,7 +44,7 @@ _QUALIFIES = re.compile(
     r"rel(ative)?|abs(olute)?|local|utc|gmt|unix|epoch|elapsed|system|ros|robot|controller|pc", re.I
 )
 """Words that say what kind of time it is, and no unit."""
-_HERTZ = re.compile(r"(\d+(?:\.\d+)?)[ _-]?hz", re.I)
+_HERTZ = re.compile(r"(\d+(?:[.,]\d+)?)[ _-]?hz", re.I)
 """`throw_4_50Hz`."""
 _SHORTEST, LONGEST = 0.1, 60.0
 """Seconds that a throw, slide or swing is recorded for. Ours, and wide on purpose."""
@@ -110,7 +110,11 @@ def counts_down(name: str, values: Stamps) -> bool:
 
 
 def _are_ticks(values: Stamps) -> bool:
-    return values.size > 0 and _TICKS[0] < values.min() and values.max() < _TICKS[1]
+    """Whether they are ticks by their size, and as nanoseconds since 2000 no recording."""
+    if values.size < 2 or values.min() < _TICKS[0] or values.max() > _TICKS[1]:
+        return False
+    length = 1e-9 * float(values.max() - values.min())
+    return length < _SHORTEST or values.size / length > _FASTEST
 
 
 def skips_frames(values: Stamps) -> bool:
@@ -222,14 +226,11 @@ def clock_of(
         times = np.arange(count) / own
         if rate is None:
             return Clock(times, f"{name} in the file", _doubt_rate(name, own, count))
-        in_name = _HERTZ.search(episode)
-        if in_name and not _same(rate, float(in_name[1])):
-            raise ConfigurationError(
-                f"--rate {rate:g}, but the name of episode {episode} says {in_name[0]}: import "
-                "those of each rate by themselves, with --append; if it is no rate, rename it"
-            )
-        differs = own_rate is not None and not _same(rate, own_rate)
-        said = f" ({name} in the file says {own_rate:g} Hz)" if differs else ""
+        stated, by = own_rate, f"{name} in the file"
+        if stated is None and (in_name := _HERTZ.search(episode)):
+            stated, by = float(in_name[1].replace(",", ".")), f"the name {episode}"
+        differs = stated is not None and not _same(rate, stated)
+        said = f" ({by} says {stated:g} Hz)" if differs else ""
         return Clock(times, f"the given rate{said}")
     try:
         numbers = np.asarray(stamps, dtype=np.float64)
@@ -243,7 +244,7 @@ def clock_of(
             "one time a frame"
         )
     known = unit or split_unit(name, SECONDS)[1]
-    if known is None and _are_ticks(numbers):
+    if known is None and time_unit is None and _are_ticks(numbers):
         numbers, known = (numbers - numbers[0]) * 100, "ns"
     unknown = None if known or time_unit else _IN_BRACKETS.search(name)
     if unknown is not None and not _QUALIFIES.fullmatch(unknown[1]):

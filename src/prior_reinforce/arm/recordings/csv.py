@@ -127,7 +127,8 @@ def _has_a_row_each(table: Table, episodes: Sequence[str]) -> bool:
     if key is None and table.named and table.is_text(0):
         called = {Path(cell).stem for cell in table.cells[0]}
         key = 0 if called.intersection(episodes) else None
-    return key is not None and len(table) == len({*table.cells[key]}) > 1
+    rows = len(table)
+    return key is not None and 1 < rows == len({*table.cells[key]}) and rows <= len(episodes)
 
 
 def _throws(

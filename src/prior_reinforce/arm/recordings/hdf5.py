@@ -39,7 +39,8 @@ _MOST_BESIDE, _MOST_BYTES_OF_NAMES = 64, 100_000
 _MOST_AT_OWN_RATE = 1_000_000
 """Numbers of what moves at another rate than the motion. Ours: sound has more."""
 _PACKING = ("scale_factor", "add_offset")
-"""Attributes by which netCDF packs numbers: number * scale_factor + add_offset."""
+_FILL = ("_FillValue", "missing_value")
+"""Attributes by which netCDF packs numbers: number * scale_factor + add_offset, and NaN."""
 _EPISODE = re.compile(r"(demo|traj|episode)_?\d+")
 
 
@@ -166,14 +167,19 @@ def _numbers(path: Path, name: str, found: Any) -> Stamps:
     for what, shape in ((name, found.shape), (f"a chunk of {name}", found.chunks or ())):
         check_numbers(path, what, shape, found.dtype.itemsize)
     numbers = np.asarray(found[()])
-    packed = {n: np.asarray(found.attrs[n]) for n in _PACKING if n in found.attrs}
-    if any(own.size != 1 or own.dtype.kind not in "fiu" for own in packed.values()):
+    packed = {n: np.asarray(found.attrs[n]) for n in (*_PACKING, *_FILL) if n in found.attrs}
+    if not any(n in packed for n in _PACKING):
+        return numbers
+    plain = all(own.size == 1 and own.dtype.kind in "fiu" for own in packed.values())
+    if not plain or numbers.dtype.kind not in "iu":
+        said = ", ".join(f"{n} = {own.tolist()}" for n, own in packed.items())
         raise FileFormatError(
-            f"{path}: {name} is packed by {packed}, expected two numbers: unpack it"
+            f"{path}: {name} ({numbers.dtype}) says {said}, expected whole numbers and two numbers "
+            "to unpack them by: write it unpacked, without these attributes"
         )
-    if packed:
-        numbers = numbers * packed.get(_PACKING[0], 1.0) + packed.get(_PACKING[1], 0.0)
-    return numbers
+    filled = np.isin(numbers, [packed[n] for n in _FILL if n in packed])
+    unpacked = numbers * packed.get(_PACKING[0], 1.0) + packed.get(_PACKING[1], 0.0)
+    return np.asarray(np.where(filled, np.nan, unpacked))
 
 
 def _own(path: Path, group: Any, key: str, depth: int = 8) -> Any:

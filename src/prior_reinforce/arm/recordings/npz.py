@@ -53,10 +53,14 @@ def _each(path: Path, arrays: Arrays, options: ReadOptions) -> Episodes:
     """Every episode of a file, each an array `throw_0`, or frames that an array numbers."""
     numbered = {name: found[1].lower() for name in arrays if (found := _TAKE.fullmatch(name))}
     takes = [n for n, own in numbered.items() if own in EPISODE_COLUMNS and arrays[n].ndim == 2]
-    if len(takes) > 1 and not options.key:
+    if len(takes) > 1 and not options.key and not any(name in arrays for name in _MOTION_KEYS):
         shared = {name: array for name, array in arrays.items() if name not in takes}
-        for name in sorted(takes, key=natural_order):
-            yield from _episodes(path, {_MOTION_KEYS[0]: arrays[name], **shared}, name, options)
+        told = [name for name in _OUTCOME_KEYS if name in shared]
+        if any(len(np.atleast_1d(shared[name])) != len(takes) for name in told):
+            raise FileFormatError(f"{path}: {told[0]} needs a row for each of {', '.join(takes)}")
+        for i, name in enumerate(sorted(takes, key=natural_order)):
+            own = shared | {each: shared[each][i] for each in told}
+            yield from _episodes(path, {**own, _MOTION_KEYS[0]: arrays[name]}, name, options)
         return
     said = next((name for name in arrays if name.lower() in EPISODE_COLUMNS), None)
     if said is None or arrays[said].ndim != 1 or len(set(arrays[said].tolist())) < 2:

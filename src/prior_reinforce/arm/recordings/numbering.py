@@ -11,8 +11,8 @@ _DATE = r"(?:(?:19|20)\d\d([-_.]?)[01]\d\1[0-3]\d|[0-3]\d([-_.])[01]\d\2(?:19|20
 _TIME = r"(?:[T_ .-]?[0-2]\d[-_.:h]?[0-5]\d(?:[-_.:m]?[0-5]\d%s)?)?"
 _PART = r"(?:[-_.,]?\d{3,9})?(?:Z|[+-]\d\d:?\d\d)?"
 """Part of a second, and the time zone."""
-_PAIRS = r"(?<!\d)[0-3]\d(?P<sign>[-_.:])[0-5]\d(?P=sign)[0-5]\d%s(?!\d)"
-"""A time of day, or a date with a short year: three pairs of digits."""
+_PAIRS = r"(?<!\d)[0-3]\d(?P<sign>[-.:])[0-5]\d(?P=sign)[0-5]\d%s(?!\d)"
+"""A time of day, or a date with a short year: three pairs of digits. `throw_01_02_03` counts."""
 _DATED = re.compile(f"(?:{_DATE}{_TIME % _PART}|{_PAIRS % _PART})$")
 """A date, one with its time of day, or that alone, at the end of a name."""
 _DATES = re.compile(f"{_DATE}{_TIME % ''}|{_PAIRS % ''}")

@@ -36,7 +36,7 @@ def remedy_for(missing: Sequence[str], there: Sequence[str]) -> str:
             f"{', '.join(errors)} may be measured from a target, and outcomes are places; add the "
             f"target's place to them, as {what} ({axes})"
         )
-    if heights := [name for name in there if name in ("z", "Z")]:
+    if (heights := [name for name in there if name in ("z", "Z")]) and {*missing} <= {"x", "y"}:
         return (
             f"{heights[0]} is no {what}; add it, and turn what a camera saw in its own axes into "
             f"the base's first ({axes})"
