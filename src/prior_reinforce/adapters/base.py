@@ -20,7 +20,7 @@ from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import Reading
 
 _STATE = 2
-"""Counts up where what `state` gives changes: states of before are not resumed."""
+"""Version of what `state` gives, part of the key, so that states kept before are not resumed."""
 
 
 @dataclass(frozen=True, eq=False)

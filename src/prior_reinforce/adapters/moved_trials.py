@@ -197,9 +197,10 @@ class MovedTrials:
         return self._held_back(aim, losses)
 
     def _losses(self, goal: Point) -> list[tuple[Point, Points]]:
-        """Aims for a goal that lost an object, and what was read of that goal: nearer to it.
+        """Aims for a goal that lost an object, each with the aims for that goal that were read.
 
-        None where it was lost once and read since: nobody knows what that loss was.
+        None where one object was lost and a later trial was read: the loss no longer counts. What
+        was read counts only where several were lost.
         """
         losses = [(aim, at) for about, aim, at in self._lost if np.array_equal(about, goal)]
         memory, again = self.belief.memory, len(losses) > 1
@@ -210,7 +211,7 @@ class MovedTrials:
         return [(aim, memory.conditions[of_goal & again]) for aim, _ in losses]
 
     def _farthest(self, losses: list[tuple[Point, Points]]) -> Point:
-        """By how much plans may be moved: nearer than where an object was lost."""
+        """By how much plans may be moved: by the symmetry, and half-way to what lost an object."""
         symmetry, left, moved = (
             self.belief.symmetry,
             self.belief.prior.left,

@@ -39,8 +39,9 @@ _MOST_BESIDE, _MOST_BYTES_OF_NAMES = 64, 100_000
 _MOST_AT_OWN_RATE = 1_000_000
 """Numbers of what moves at another rate than the motion. Ours: sound has more."""
 _PACKING = ("scale_factor", "add_offset")
+"""Attributes by which netCDF packs numbers: a value is number * scale_factor + add_offset."""
 _FILL = ("_FillValue", "missing_value")
-"""Attributes by which netCDF packs numbers: number * scale_factor + add_offset, and NaN."""
+"""Its attributes for the number that stands for no value."""
 _EPISODE = re.compile(r"(demo|traj|episode)_?\d+")
 
 

@@ -36,6 +36,7 @@ from prior_reinforce.files import open_npz
 SUFFIXES = (".npz", ".npy")
 _MOTION_KEYS = ("q", "plans", "positions", "actions")
 _TAKE = re.compile(r"(.+?)_?\d+")
+"""Name of an array that is a throw of its own: `throw_0`."""
 _OUTCOME_KEYS = ("outcome", "outcomes", "outcomes_seen")
 
 

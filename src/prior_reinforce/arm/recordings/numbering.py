@@ -12,7 +12,7 @@ _TIME = r"(?:[T_ .-]?[0-2]\d[-_.:h]?[0-5]\d(?:[-_.:m]?[0-5]\d%s)?)?"
 _PART = r"(?:[-_.,]?\d{3,9})?(?:Z|[+-]\d\d:?\d\d)?"
 """Part of a second, and the time zone."""
 _PAIRS = r"(?<!\d)[0-3]\d(?P<sign>[-.:])[0-5]\d(?P=sign)[0-5]\d%s(?!\d)"
-"""A time of day, or a date with a short year: three pairs of digits. `throw_01_02_03` counts."""
+"""A time of day, or a date with a short year. `throw_01_02_03` is neither: it is numbered."""
 _DATED = re.compile(f"(?:{_DATE}{_TIME % _PART}|{_PAIRS % _PART})$")
 """A date, one with its time of day, or that alone, at the end of a name."""
 _DATES = re.compile(f"{_DATE}{_TIME % ''}|{_PAIRS % ''}")

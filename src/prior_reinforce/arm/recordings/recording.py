@@ -38,7 +38,7 @@ _LARGEST_POINTER, _MOST_FILES = 1024, 5_000
 _WIDER = 5
 """Times as many columns without names as frames that no motion has. Ours."""
 _DETOUR = 1.5
-"""Times as far as a motion goes if its frames are put out of order. Ours."""
+"""A motion whose frames are put in a wrong order goes so many times as far, at least. Ours."""
 _LEAP = 3.0
 """Steps of a motion, as large as its largest, that make a leap. Ours."""
 EPISODE_COLUMNS = tuple(
