@@ -148,6 +148,19 @@ def test_words_and_readings_reach_the_adapter_as_they_were_said(listening):
     assert [trial.reading.said for trial in listening.trials[:2]] == ["5 cm long, 2 cm left", ""]
 
 
+def test_words_that_name_no_hit_say_that_it_missed(listening):
+    for seen in ("2cm right", Reading.measured([0.0, -0.02], 0.001), "1cm left"):
+        listening.tell(listening.ask().number, seen)
+    listening.ask()
+    by_eye, measured, near = (reading for _, reading in listening.adapter.heard)
+    # At least 1.5 cm in all, of which ahead may be 1 cm.
+    np.testing.assert_allclose(by_eye.high[1], -np.sqrt(0.015**2 - 0.01**2))
+    np.testing.assert_allclose(by_eye.missed_by_at_least, 0.015)
+    assert measured.missed_by_at_least is None
+    assert near.missed_by_at_least is None
+    assert listening.solved
+
+
 def test_numbers_are_of_unknown_origin_to_a_third_of_the_tolerance(listening):
     listening.tell(listening.ask().number, [0.0, -0.08])
     np.testing.assert_allclose(listening.trials[0].reading.sd, [0.005, np.hypot(0.005, 0.016)])

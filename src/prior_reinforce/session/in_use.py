@@ -230,8 +230,10 @@ def _told(state: State, model: str) -> Iterator[tuple[str, tuple[Any, ...]]]:
         hardware = max(hardware, about.number)
         if trial is not None:
             assert trial.reading is not None
-            reading = trial.reading.within(about.tolerance)
-            yield "observe", (trial.condition, about.goal, reading)
+            reading = trial.reading
+            if reading.said and reading.hit is None and not trial.hit:
+                reading = reading.with_hit(False)  # whoever watched it and names no hit saw a miss
+            yield "observe", (trial.condition, about.goal, reading.within(about.tolerance))
 
 
 def _missed(state: State, condition: Point) -> int:
