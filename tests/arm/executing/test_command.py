@@ -138,17 +138,17 @@ def test_a_program_that_the_system_cannot_start_is_named(plan_file, tmp_path):
 def test_who_is_interrupted_before_it_runs_runs_nothing(plan_file, tmp_path):
     result, ran = tmp_path / "result", tmp_path / "ran"
     result.mkdir()
-    with executing_lock() as lock, Interruptions() as interruptions:
-        interruptions.came = True
-        with pytest.raises(KeyboardInterrupt):
-            execute_command(
-                f"touch {ran} {{plan}}",
-                plan_file,
-                result,
-                time_limit=30,
-                lock=lock,
-                interruptions=interruptions,
-            )
+    noted = Interruptions()
+    noted.came = True
+    with pytest.raises(KeyboardInterrupt), executing_lock() as lock, noted:
+        execute_command(
+            f"touch {ran} {{plan}}",
+            plan_file,
+            result,
+            time_limit=30,
+            lock=lock,
+            interruptions=noted,
+        )
     assert not ran.exists()
 
 

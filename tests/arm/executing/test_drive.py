@@ -22,6 +22,7 @@ from prior_reinforce.arm.executing.drive import (
     drive_command,
     make_executor,
     read_look,
+    say_distance,
 )
 from prior_reinforce.arm.robots.gate_settings import GateSettings
 from prior_reinforce.arm.robots.limits import RobotLimits
@@ -349,3 +350,52 @@ def test_an_arm_that_does_not_say_where_a_joint_stands_is_not_moved(arm):
         assert result.outcome == "not_moved"
         assert "toy does not say where joint2 stands" in result.reason
     assert arm.motions() == 0
+
+
+UNITS = ("rad", "m", "percent", "steps")
+OF_UNITS = PlanFormat(("joint1", "rail", "gripper", "valve"), UNITS, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("off", "said", "there"),
+    [
+        ((0.01, 0.005, 0.1, 0), "0.005 m (rail), 0.1 percent (gripper)", True),
+        (
+            (0.01, 0.005, -12.0, 0),
+            "12 percent (gripper); 5 is allowed, 0 steps",
+            False,
+        ),
+        (
+            (0.03, 0.005, 0.1, 0),
+            "0.03 rad (joint1); 0.02 is allowed, 0.005 m",
+            False,
+        ),
+        ((0.01, -0.02, 0.1, 0), "0.02 m (rail); 0.01 is allowed, ", False),
+        (
+            (0.01, 0.005, 0.1, 90),
+            "90 steps (valve), which is held against nothing",
+            False,
+        ),
+        (
+            (float("nan"), 0.005, 0.1, 0),
+            "inf rad (joint1); 0.02 is allowed",
+            False,
+        ),
+    ],
+)
+def test_units_are_never_compared_with_each_other(off, said, there):
+    text, near = say_distance(np.abs(off), OF_UNITS, GateSettings())
+    assert said in text.replace(" from the start pose", "")
+    assert near == there
+
+
+def test_a_joint_that_is_no_number_is_not_there_whatever_the_others_are():
+    form = PlanFormat(("joint1", "joint2"), ("rad", "rad"), 0.01)
+    for off in ([float("nan"), 0.0], [0.0, float("nan")]):
+        assert not say_distance(np.array(off), form, GateSettings())[1]
+
+
+def test_a_unit_may_be_given_its_own_error():
+    own = GateSettings(errors=(("steps", 40.0, 40.0),), start_error=0.1)
+    for steps, near in ((39, True), (41, False)):
+        assert say_distance(np.array([0.09, 0.0, 0.0, steps]), OF_UNITS, own)[1] == near

@@ -38,12 +38,14 @@ from prior_reinforce.arm.executing.supervision import Interruptions
 folder, path, sha256, command, limit = sys.argv[1:]
 result = Path(folder, "result")
 result.mkdir()
-with executing_lock(Path(folder)) as lock, Interruptions() as interruptions:
-    ended, _ = execute_command(
-        command, PlanFile(Path(path), sha256), result, time_limit=float(limit), lock=lock,
-        interruptions=interruptions,
-    )
-sys.exit(interruptions.came)
+try:
+    with executing_lock(Path(folder)) as lock, Interruptions() as interruptions:
+        execute_command(
+            command, PlanFile(Path(path), sha256), result, time_limit=float(limit), lock=lock,
+            interruptions=interruptions,
+        )
+except KeyboardInterrupt:
+    sys.exit(1)
 """
 MOVES = "trap '' TERM; echo $$ > {here}/pid; while [ ! -e {here}/stop ]; do sleep 0.02; done"
 RESTS = """

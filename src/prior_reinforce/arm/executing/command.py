@@ -73,7 +73,7 @@ def run_command(
         executing_lock(arm=arm) as lock,
         Interruptions() as interruptions,
     ):
-        result, raised = execute_command(
+        return execute_command(
             command,
             plan,
             Path(folder),
@@ -82,11 +82,6 @@ def run_command(
             interruptions=interruptions,
             show=show,
         )
-    if raised is not None:
-        raise raised
-    if interruptions.came:
-        raise KeyboardInterrupt
-    return result
 
 
 def execute_command(
@@ -98,11 +93,8 @@ def execute_command(
     lock: ExecutingLock,
     interruptions: Interruptions,
     show: Callable[[str], None] | None = None,
-) -> tuple[MotionResult, BaseException | None]:
+) -> MotionResult:
     """`run_command` under a lock that is held, with an empty folder for `{result}`.
-
-    Returns:
-        How it ended, and what `show` or a signal's handler raised, which stopped the command.
 
     Raises:
         ConfigurationError, FileFormatError, KeyboardInterrupt: Nothing has run.
@@ -112,7 +104,7 @@ def execute_command(
     arguments = split_command(command, copy, folder)
     if interruptions.came:
         raise KeyboardInterrupt
-    ended, raised = supervise(
+    ended = supervise(
         arguments, folder, time_limit=time_limit, interruptions=interruptions, lock=lock, show=show
     )
     with suppress(OSError):  # a driver may delete its files; that it ran must stay to be found
@@ -124,7 +116,31 @@ def execute_command(
             f"cannot start {arguments[0]!r} ({ended.not_started}); give the path of a program that "
             "can run"
         )
-    return _result(ended, folder, plan), raised
+    return _result(ended, folder, plan)
+
+
+def ask_arm(command: str, arguments: tuple[str, ...], folder: Path, *, time_limit: float) -> None:
+    """Run a command that moves nothing, to its end.
+
+    Args:
+        command: What it is called in messages.
+        arguments: Its program and arguments.
+        folder: An empty folder for what watches over it.
+        time_limit: In [s].
+
+    Raises:
+        ConfigurationError: It cannot be started, fails, or takes too long.
+        KeyboardInterrupt: Interrupted, once all has ended.
+    """
+    with Interruptions() as noted:
+        ended = supervise(arguments, folder, time_limit=time_limit, interruptions=noted)
+    ended = ended or Ended(not_started="what watched over it was killed")
+    if ended.not_started or ended.fault or ended.timed_out or ended.exit_status:
+        said = ended.not_started or ended.fault or ended.output_tail.strip() or "no output"
+        why = f"no answer within {time_limit:g} s" if ended.timed_out else said.splitlines()[-1]
+        raise ConfigurationError(
+            f"{command!r} did not say where the arm stands: {why}; mend that, then ask again"
+        )
 
 
 def read_result(folder: Path, plan: PlanFile) -> MotionResult | None:

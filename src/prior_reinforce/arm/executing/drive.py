@@ -32,7 +32,6 @@ from prior_reinforce.arm.executing.base import (
     Motion,
     begin_at,
 )
-from prior_reinforce.arm.executing.pose import compare_pose
 from prior_reinforce.arm.executing.result import (
     NOT_MOVED_STATUS,
     PATH_FILE,
@@ -68,8 +67,6 @@ _START_TOLERANCE: Mapping[Kind, float] = {"angle": 0.002, "length": 0.0005, "sha
 """Distance from the first frame, in [rad], [m] and [1], up to which a plan is made to begin where
 the arm stands (`begin_at`); from farther off, the arm goes to the first frame slowly. Ours: what a
 servo at rest is off."""
-# Without the folder that the user happens to stand in: nothing there may be taken for a module.
-_START = f"import sys; sys.path[:] = filter(None, sys.path); import {__name__}; {__name__}.main()"
 
 
 class Request(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -106,8 +103,14 @@ class Look(msgspec.Struct, frozen=True):
 def drive_command(request: Request) -> str:
     """The command that fulfils a request, with `{plan}` and `{result}` to be filled in."""
     text = msgspec.json.encode(request, enc_hook=lambda array: array.tolist()).decode()
-    words = [sys.executable, "-c", _START, text]
-    return f"{shlex.join(words)} {{plan}} {{result}}"
+    return f"{shlex.join([*program(__name__), text])} {{plan}} {{result}}"
+
+
+def program(module: str) -> list[str]:
+    """Program and arguments that call a module's `main`, which reads what is added to them."""
+    # Without the folder that the user happens to stand in: nothing there may be taken for a module.
+    start = f"import sys; sys.path[:] = filter(None, sys.path); import {module}; {module}.main()"
+    return [sys.executable, "-c", start]
 
 
 def read_look(folder: Path) -> Look:
@@ -197,6 +200,37 @@ def approach(
     return Plan(frames, PlanFormat(arm.columns, arm.units, _APPROACH_DT))
 
 
+def say_distance(
+    off: Float[np.ndarray, " D"], form: PlanFormat, settings: GateSettings
+) -> tuple[str, bool]:
+    """Hold the distances of a plan's columns from its first frame against what is allowed.
+
+    Args:
+        off: Of each column, in its unit.
+        form: Of the plan.
+        settings: How far it may be off (`errors_of`); a unit of which they say nothing is named,
+            and must not be off at all.
+
+    Returns:
+        What is off most in each unit, in words; and whether all is near enough.
+    """
+    worst: dict[str, tuple[float, str]] = {}
+    off = np.nan_to_num(off, nan=np.inf, posinf=np.inf)  # what is no number may be anywhere
+    for name, unit, distance in zip(form.names, form.units, off.tolist(), strict=True):
+        worst[unit] = max((distance, name), worst.get(unit, (0.0, name)))
+    said, there = [], True
+    for unit, (distance, name) in worst.items():
+        allowed = settings.errors_of(unit)
+        text = f"{distance:.3g} {unit} ({name}) from the start pose"
+        if allowed is None:
+            text += f", which is held against nothing: add {unit} to errors in [gate]"
+            there = there and distance == 0
+        elif distance > allowed[0]:
+            text, there = f"{text}; {allowed[0]:g} is allowed", False
+        said.append(text)
+    return f"the arm is {', '.join(said)}", there
+
+
 class _Prepared:
     """A plan in an arm's columns, and how the arm stands to it; nothing moves here."""
 
@@ -215,8 +249,8 @@ class _Prepared:
         self.plan = Plan(frames, own)
         """Channels that the plan leaves out are held where they stand."""
         self._here = dict(zip(plan.format.names, pose[self.channels].tolist(), strict=True))
-        first = plan.actions[0].tolist()
-        self._said, self._there = compare_pose(self._here, first, plan.format, request.gate)
+        off = np.abs(pose[self.channels] - plan.actions[0])
+        self._said, self._there = say_distance(off, plan.format, request.gate)
 
     @property
     def to_start(self) -> Plan:

@@ -34,14 +34,19 @@ _STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGTSTP)
 
 
 class Interruptions:
-    """Signals that would end or stop this program, noted while it may not end.
+    """What would end or stop this program, kept until the end of a `with` block, which raises it.
 
-    Used in a `with` block of the main thread; in another thread none arrive.
+    Signals are kept in the main thread; in another thread none arrive.
     """
 
     def __init__(self) -> None:
         """None came yet."""
         self.came = False
+        """Whether a signal came; a KeyboardInterrupt is then raised."""
+        self.raised: BaseException | None = None
+        """What was raised while something moved, by `show` or a signal's handler."""
+        self.said = ""
+        """What became of what moved, for the KeyboardInterrupt."""
         self._before: dict[int, Any] = {}
 
     def __enter__(self) -> Interruptions:
@@ -52,10 +57,14 @@ class Interruptions:
                     self._before[number] = signal.signal(number, self._note)
         return self
 
-    def __exit__(self, *_: object) -> None:
-        """Let them through again."""
+    def __exit__(self, kind: object, *_: object) -> None:
+        """Let them through again, and raise what came, unless the block raises something else."""
         for number, handler in self._before.items():
             signal.signal(number, handler)
+        if kind is None and self.raised is not None:
+            raise self.raised
+        if kind is None and self.came:
+            raise KeyboardInterrupt(*filter(None, [self.said]))
 
     def _note(self, *_: object) -> None:
         self.came = True
@@ -98,12 +107,13 @@ def supervise(
     interruptions: Interruptions,
     lock: ExecutingLock | None = None,
     show: Callable[[str], None] | None = None,
-) -> tuple[Ended | None, BaseException | None]:
+) -> Ended | None:
     """Run a command under the supervisor until all that it started has ended.
 
+    What is raised meanwhile, by `show` or a signal's handler, stops it and is in `interruptions`.
+
     Returns:
-        What the supervisor wrote, None where it could not; and what was raised meanwhile, by `show`
-        or a signal's handler, which stopped the command.
+        What the supervisor wrote; None where it could not.
 
     Raises:
         ConfigurationError: The system starts nothing; nothing has run.
@@ -117,7 +127,7 @@ def supervise(
                 f"nothing can be started ({error.strerror}); close other programs, or make room"
             ) from error
         supervised.watch(interruptions)
-        return supervised.ended, supervised.raised
+        return supervised.ended
 
 
 class _Supervised:
@@ -133,7 +143,6 @@ class _Supervised:
         stack: ExitStack,
     ) -> None:
         """Start the supervisor, which waits for our word: if this raises, nothing is started."""
-        self.raised: BaseException | None = None
         self._lock, self._time_limit, self._run = lock, time_limit, f"run-{uuid.uuid4().hex}"
         descriptors, names = ((), ()) if lock is None else (lock.descriptors, lock.names)
         output = stack.enter_context((folder / OUTPUT_FILE).open("wb", buffering=0))
@@ -175,7 +184,7 @@ class _Supervised:
                     return
             except BaseException as error:
                 # Whatever it is, the arm moves: it stops before anybody hears of it.
-                self.raised = self.raised or error
+                interruptions.raised = interruptions.raised or error
                 self._shown.show = None
 
     def _look(self, interruptions: Interruptions) -> bool:
@@ -186,7 +195,7 @@ class _Supervised:
                 self._ready, self._heard = True, now
         # Who stops a workspace finds nothing to stop if this begins just then.
         if not self._asked and (
-            self.raised is not None
+            interruptions.raised is not None
             or interruptions.came
             or (self._lock is not None and self._lock.revoked())
         ):

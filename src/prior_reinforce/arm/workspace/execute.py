@@ -17,10 +17,14 @@ from msgspec import structs
 
 from prior_reinforce.arm.executing.arguments import check_command, split_command, without_arguments
 from prior_reinforce.arm.executing.base import ArmSettings, Motion
-from prior_reinforce.arm.executing.command import execute_command, read_result, was_executed
+from prior_reinforce.arm.executing.command import (
+    ask_arm,
+    execute_command,
+    read_result,
+    was_executed,
+)
 from prior_reinforce.arm.executing.drive import Look, Request, drive_command, read_look
 from prior_reinforce.arm.executing.lock import executing_lock
-from prior_reinforce.arm.executing.pose import ask_arm
 from prior_reinforce.arm.executing.result import MotionResult, measure_tracking
 from prior_reinforce.arm.executing.supervision import Interruptions
 from prior_reinforce.arm.workspace.events import Moved, Moving
@@ -118,7 +122,7 @@ def execute(
         by = command.executor if isinstance(command, ArmSettings) else without_arguments(text)
         _begin(workspace, Moving(number, motion, by, folder.name, speed))
         try:
-            result, raised = execute_command(
+            result = execute_command(
                 text,
                 file,
                 folder,
@@ -132,11 +136,8 @@ def execute(
             raise
         if result.outcome != "unknown":
             result = _record(workspace, result, trial, folder, motion, speed)
-    if raised is not None:
-        raise raised
-    if interruptions.came:
         which = f"trial {number}" if motion == "trial" else f"the {motion} of trial {number}"
-        raise KeyboardInterrupt(f"{which}: {result.outcome} ({result.reason})")
+        interruptions.said = f"{which}: {result.outcome} ({result.reason})"
     return result
 
 
