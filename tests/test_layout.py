@@ -20,7 +20,6 @@ TESTED_ELSEWHERE = {
     "arm/workspace/folder": "what is one and what is not is in arm/workspace/test_workspace",
     "arm/workspace/reaching": "goals out of reach are in arm/workspace/test_declared",
     "arm/workspace/template": "what it writes is read in arm/workspace/test_manifest",
-    "commands/telling": "tell, amend and void are in commands/test_trials and test_reading",
     "session/in_use": "what a session loads is in session/test_session",
     "perception/base": "an interface, held to in testing/test_perception",
 }

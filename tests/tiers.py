@@ -54,7 +54,7 @@ NOT_QUICK = (
     "tests/commands/test_learning.py",
     "tests/commands/test_outcome_questions.py",
     "tests/commands/test_photographs.py",
-    "tests/commands/test_reading.py",
+    "tests/commands/test_telling.py",
     "tests/commands/test_record.py",
     "tests/commands/test_simulated.py",
     "tests/commands/test_trials.py",
