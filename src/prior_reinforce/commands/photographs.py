@@ -205,45 +205,44 @@ class Look:
             folder.mkdir(exist_ok=True)
             reading.save(folder, stem)
         if reading.error_seen is None:
-            failed = PerceptionFailedError(
-                f"{reading.problem}; look at {drawn} and tell what you see yourself"
-            )
-            failed.changed = True  # what was seen is kept
-            raise failed
+            raise _refused(f"{reading.problem}; look at {drawn} and tell what you see yourself")
+        for sighting in filter(None, (reading.reached, reading.goal)):
+            _warn_if_beyond(here, sighting)
         error = reading.error_seen
-        for sighting in (reading.reached, reading.goal):
-            beyond, across = (0.0, 0.0) if sighting is None else _beyond(here, sighting)
-            if sighting is not None and beyond > _FAR_BEYOND * across:
-                warn(
-                    f"{sighting.words} is seen {100 * beyond:.0f} cm beyond the calibrated "
-                    f"points, which are {100 * across:.0f} cm apart: there nothing tells how far "
-                    "off its place is; calibrate with points all around"
-                )
         if goal is not None and reading.reached.place is not None:
             error = reading.reached.place - goal
-            moved = float(np.linalg.norm(error - reading.error_seen))
-            says = f"{self.goal} is seen {100 * moved:.1f} cm from the goal that is set; "
-            if moved > max(_OTHER_GOAL, 3 * here.sd):
-                failed = PerceptionFailedError(
-                    f"{says}is this the picture, the calibration and the model family that you "
-                    f"think? look at {drawn}"
-                )
-                failed.changed = True
-                raise failed
-            off, how = _flipped(here, reading, goal)
-            if moved > _FLIPPED and off <= min(max(_SAME_GOAL, 3 * here.sd), moved / 3):
-                failed = PerceptionFailedError(
-                    f"{says}in the picture {how} it would be seen {100 * off:.1f} cm from it: is "
-                    "the photograph as the camera took it when it was calibrated?"
-                )
-                failed.changed = True
-                raise failed
-            if moved > _SAME_GOAL:
-                warn(f"{says}check the calibration, or move it there")
+            self._check_goal(here, reading, goal, drawn)
         print(f"seen: {to_words(error)}   boxes: {drawn}")
         numbers = " ".join(f"{component:.4f}+-{here.sd:.2g}" for component in error)
         told = "FOLDER TRIAL" if goal is None else f"{shlex.quote(str(folder.parent))} {self.trial}"
         print(f"if the boxes are right: prior-reinforce tell {told} {numbers}")
+
+    def _check_goal(
+        self, here: TableCalibration, reading: PictureReading, goal: Point, drawn: Path
+    ) -> None:
+        """Refuse a picture, or warn of it, in which the goal's object is seen beside the goal."""
+        assert reading.goal is not None
+        assert reading.goal.place is not None
+        assert reading.goal_place is not None
+        moved = float(np.linalg.norm(reading.goal_place - goal))
+        says = f"{self.goal} is seen {100 * moved:.1f} cm from the goal that is set; "
+        if moved > max(_OTHER_GOAL, 3 * here.sd):
+            raise _refused(
+                f"{says}is this the picture, the calibration and the model family that you think? "
+                f"look at {drawn}"
+            )
+        (u, v), (tall, wide) = here.to_pixels(reading.goal.place), reading.picture.shape[:2]
+        flips = {"turned by half a turn": (wide - u, tall - v), "mirrored": (wide - u, v)}
+        offset = reading.goal_place - reading.goal.place - goal
+        offs = {how: here.to_table(np.array(at)) + offset for how, at in flips.items()}
+        off, how = min((float(np.linalg.norm(off)), how) for how, off in offs.items())
+        if moved > _FLIPPED and off <= min(max(_SAME_GOAL, 3 * here.sd), moved / 3):
+            raise _refused(
+                f"{says}in the picture {how} it would be seen {100 * off:.1f} cm from it: is the "
+                "photograph as the camera took it when it was calibrated?"
+            )
+        if moved > _SAME_GOAL:
+            warn(f"{says}check the calibration, or move it there")
 
     def _of_trial(self) -> tuple[Point | None, Path, str]:
         """The goal that the trial was for, where to keep what is seen, and its name there."""
@@ -266,28 +265,29 @@ class Look:
         return goal, folder / "pictures", f"trial-{self.trial:03d}-seen"
 
 
-def _flipped(here: TableCalibration, reading: PictureReading, goal: Point) -> tuple[float, str]:
-    """How near the goal, in [m], its object is seen in the picture turned or mirrored, and how."""
-    assert reading.goal is not None
-    assert reading.goal.place is not None
-    assert reading.goal_place is not None
-    (u, v), (tall, wide) = here.to_pixels(reading.goal.place), reading.picture.shape[:2]
-    flips = {"turned by half a turn": (wide - u, tall - v), "mirrored": (wide - u, v)}
-    offset = reading.goal_place - reading.goal.place
-    offs = {how: here.to_table(np.array(at)) + offset - goal for how, at in flips.items()}
-    return min((float(np.linalg.norm(off)), how) for how, off in offs.items())
+def _refused(why: str) -> PerceptionFailedError:
+    """What is raised after what was seen is kept."""
+    error = PerceptionFailedError(why)
+    error.changed = True
+    return error
 
 
-def _beyond(calibration: TableCalibration, sighting: Sighting) -> tuple[float, float]:
-    """How far an object lies outside the box around the clicked points, and its diagonal, [m]."""
+def _warn_if_beyond(calibration: TableCalibration, sighting: Sighting) -> None:
+    """Warn of an object that is seen far outside the box around the clicked points."""
     if calibration.clicked is None or sighting.box is None:
-        return 0.0, 0.0
+        return
     left, top, right, bottom = calibration.clicked
     u, v = (sighting.box[0] + sighting.box[2]) / 2, (sighting.box[1] + sighting.box[3]) / 2
     nearest = np.array([np.clip(u, left, right), np.clip(v, top, bottom)])
     place, edge = calibration.to_table(np.array([u, v])), calibration.to_table(nearest)
     ends = calibration.to_table(np.array([[left, top], [right, bottom]]))
-    return float(np.linalg.norm(place - edge)), float(np.linalg.norm(ends[1] - ends[0]))
+    beyond, across = np.linalg.norm(place - edge), np.linalg.norm(ends[1] - ends[0])
+    if beyond > _FAR_BEYOND * across:
+        warn(
+            f"{sighting.words} is seen {100 * beyond:.0f} cm beyond the calibrated points, which "
+            f"are {100 * across:.0f} cm apart: there nothing tells how far off its place is; "
+            "calibrate with points all around"
+        )
 
 
 def _check_turn(picture: Path, pixels: Float[np.ndarray, "n 2"], size: tuple[int, int]) -> None:
