@@ -86,22 +86,13 @@ def as_outcomes(values: ArrayLike, n_plans: int) -> Points:
     Raises:
         InvalidDemonstrationsError: Wrong shape, none, or values that are not finite.
     """
-    outcomes = _as_numbers(
-        values, InvalidDemonstrationsError, "outcomes must be an array (N, k) of numbers"
-    )
-    if outcomes.ndim != 2 or outcomes.shape[1] < 1:
-        raise InvalidDemonstrationsError(f"outcomes must have shape (N, k), got {outcomes.shape}")
-    n = len(outcomes)
-    if n != n_plans:
-        raise InvalidDemonstrationsError(f"{n_plans} plans need as many outcomes, got {n}")
-    if n < 1:
-        raise InvalidDemonstrationsError("at least one demonstration is needed, got none")
-    if not np.all(np.isfinite(outcomes)):
-        row = _first_not_finite(outcomes)
+    outcomes = _as_rows(values, InvalidDemonstrationsError, "outcomes", None)
+    if len(outcomes) != n_plans:
         raise InvalidDemonstrationsError(
-            f"outcomes must be finite, but demonstration {row} has {outcomes[row].tolist()}; "
-            "measure it again, or drop that demonstration"
+            f"{n_plans} plans need as many outcomes, got {len(outcomes)}"
         )
+    if n_plans < 1:
+        raise InvalidDemonstrationsError("at least one demonstration is needed, got none")
     outcomes.setflags(write=False)
     return outcomes
 
@@ -136,20 +127,7 @@ def as_conditions(values: ArrayLike, outcome_dim: int) -> Points:
     Raises:
         InvalidGoalError: Wrong shape, or not finite.
     """
-    conditions = _as_numbers(
-        values, InvalidGoalError, "conditions must be an array (n, k) of numbers"
-    )
-    if conditions.ndim != 2 or conditions.shape[1] != outcome_dim:
-        raise InvalidGoalError(
-            f"conditions must have shape (n, {outcome_dim}), one row for each plan, "
-            f"got {conditions.shape}"
-        )
-    if not np.all(np.isfinite(conditions)):
-        row = _first_not_finite(conditions)
-        raise InvalidGoalError(
-            f"conditions must be finite, but row {row} is {conditions[row].tolist()}"
-        )
-    return conditions
+    return _as_rows(values, InvalidGoalError, "conditions", outcome_dim)
 
 
 def as_goal(values: ArrayLike, outcome_names: Sequence[str]) -> Point:
@@ -203,6 +181,24 @@ def as_vector(
     return vector
 
 
+def _as_rows(
+    values: ArrayLike, problem: type[PriorReinforceError], name: str, k: int | None
+) -> Points:
+    """Points, of k components if that is known."""
+    shape = f"(n, {k or 'k'})"
+    rows = _as_numbers(values, problem, f"{name} must be an array {shape} of numbers")
+    if rows.ndim != 2 or rows.shape[1] < 1 or rows.shape[1] != (k or rows.shape[1]):
+        raise problem(f"{name} must have shape {shape}, one row for each plan, got {rows.shape}")
+    bad = ~np.isfinite(rows).all(axis=1)
+    if bad.any():
+        row = int(bad.argmax())
+        raise problem(
+            f"{name} must be finite, but row {row} is {rows[row].tolist()}; measure it again, or "
+            "leave it out"
+        )
+    return rows
+
+
 def _as_numbers(
     values: ArrayLike, problem: type[PriorReinforceError], expected: str
 ) -> Float[np.ndarray, "..."]:
@@ -216,7 +212,3 @@ def _as_numbers(
         largest = float(np.abs(array[np.isfinite(array)]).max())
         raise problem(f"{expected}, got {largest:.4g}, which is implausibly large; check the unit")
     return array
-
-
-def _first_not_finite(rows: Points) -> int:
-    return int(np.argwhere(~np.isfinite(rows))[0][0])
