@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from prior_reinforce.arm.executing.watch import State
+from prior_reinforce.arm.executing.base import GuidedState
 from prior_reinforce.arm.workspace.manifest import parse_manifest
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.commands.importing import Import
@@ -114,7 +114,7 @@ def test_no_take_is_recorded_over_one_that_was_given_its_name(tmp_path):
     for size in (1.0, 2.0):
         session.toggle()
         for i in range(12):
-            session.add(State(i / 100, [size * i, 0.0], [size * i, 0.0]))
+            session.add(GuidedState(i / 100, *2 * [np.array([size * i, 0.0])]))
         session.toggle()
         if size == 1.0:
             session.name_last()

@@ -14,10 +14,10 @@ from typing import Any, Literal
 import numpy as np
 from typing_extensions import Self
 
-from prior_reinforce.arm.executing.base import Guiding
+from prior_reinforce.arm.executing.base import GuidedState, Guiding
 from prior_reinforce.arm.executing.drive import arms_columns, guiding_of
 from prior_reinforce.arm.executing.lock import executing_lock
-from prior_reinforce.arm.executing.watch import State, Take, Watch
+from prior_reinforce.arm.executing.watch import Take, Watch
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.outcomes import OUTCOMES_FILE, Place, keep_places
 from prior_reinforce.arm.workspace.manifest import Manifest
@@ -156,7 +156,7 @@ def _by_keys(watch: Watch, session: _Session) -> None:
             watch.forget()
 
 
-def _state(watch: Watch) -> State:
+def _state(watch: Watch) -> GuidedState:
     """The next state.
 
     Raises:
@@ -192,7 +192,7 @@ class _Session:
         names = (f"take-{number}" for number in count(self.number + 1))
         return next(name for name in names if name not in self.taken)
 
-    def add(self, state: State) -> None:
+    def add(self, state: GuidedState) -> None:
         """One more state, of a take if there is one."""
         if self.open is not None:
             self.open.states.append(state)

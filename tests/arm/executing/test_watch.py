@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.arm.executing.base import ArmSettings
+from prior_reinforce.arm.executing.base import ArmSettings, GuidedState
 from prior_reinforce.arm.executing.lock import executing_lock, stop_executing
 from prior_reinforce.arm.executing.result import lag_behind
-from prior_reinforce.arm.executing.watch import State, Take, Watch
+from prior_reinforce.arm.executing.watch import Take, Watch
 from prior_reinforce.arm.recordings import read_recordings
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.plan_format import PlanFormat
@@ -31,7 +31,7 @@ def test_states_come_with_the_arms_own_times(tmp_path, lock):
         assert watch.arm.columns == ("joint1", "joint2")
         states = [watch.next(20.0) for _ in range(151)]
     assert [state.t for state in states] == pytest.approx(np.arange(151) / 100)
-    assert states[150].commanded != states[150].measured
+    assert np.all(states[150].commanded != states[150].measured)
 
 
 def test_an_arm_that_is_not_there_says_why(tmp_path, lock):
@@ -72,7 +72,8 @@ def test_without_an_arm_the_program_says_one_line(lock):
 def take():
     """Two seconds, the measured motion 80 ms behind the commanded one."""
     t = np.arange(200) / 100
-    states = [State(5.0 + s, [np.sin(s), 2.0], [np.sin(max(s - 0.08, 0)), 2.0]) for s in t]
+    both = [[np.array([np.sin(max(s - lag, 0)), 2.0]) for lag in (0.0, 0.08)] for s in t]
+    states = [GuidedState(5.0 + s, *each) for s, each in zip(t, both, strict=True)]
     return Take("take-1", states)
 
 

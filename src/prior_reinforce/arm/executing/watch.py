@@ -3,7 +3,7 @@
     python -m prior_reinforce.arm.executing.watch ARM
 
 The program runs by itself, as whatever drives an arm does. Its output is lines of JSON: the arm,
-then a state at every cycle. It ends with its input.
+then a `GuidedState` at every cycle. It ends with its input.
 """
 
 from __future__ import annotations
@@ -25,23 +25,13 @@ import numpy as np
 from jaxtyping import Float
 from typing_extensions import Self
 
-from prior_reinforce.arm.executing.base import ArmDescription, ArmSettings
-from prior_reinforce.arm.executing.drive import make_executor
+from prior_reinforce.arm.executing.base import ArmDescription, ArmSettings, GuidedState
+from prior_reinforce.arm.executing.drive import make_executor, program
 from prior_reinforce.arm.executing.lock import MARK, ExecutingLock
 from prior_reinforce.arm.executing.result import lag_behind
 from prior_reinforce.errors import ConfigurationError, PriorReinforceError
 from prior_reinforce.files import named_disk_errors
 from prior_reinforce.plans.plan_format import PlanFormat
-
-_START = f"import sys; sys.path[:] = filter(None, sys.path); import {__name__}; {__name__}.main()"
-
-
-class State(msgspec.Struct, array_like=True, frozen=True):
-    """A line of output: a `GuidedState`."""
-
-    t: float
-    commanded: list[float]
-    measured: list[float]
 
 
 @dataclass(eq=False)
@@ -49,7 +39,7 @@ class Take:
     """One demonstration."""
 
     name: str
-    states: list[State] = field(default_factory=list)
+    states: list[GuidedState] = field(default_factory=list)
 
     @property
     def t(self) -> Float[np.ndarray, " T"]:
@@ -90,7 +80,7 @@ class Watch:
             ConfigurationError: It has not.
         """
         self._process = subprocess.Popen(
-            [sys.executable, "-c", _START, msgspec.json.encode(arm).decode()],
+            [*program(__name__), msgspec.json.encode(arm).decode()],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             pass_fds=lock.descriptors,
@@ -105,7 +95,7 @@ class Watch:
         except BaseException:
             self.__exit__()
             raise
-        self._states: queue.SimpleQueue[State | PriorReinforceError] = queue.SimpleQueue()
+        self._states: queue.SimpleQueue[GuidedState | PriorReinforceError] = queue.SimpleQueue()
         self._listener.start()
 
     def _line(self) -> bytes:
@@ -117,14 +107,14 @@ class Watch:
         return line
 
     def _listen(self) -> None:
-        decoder = msgspec.json.Decoder(State)
+        decoder = msgspec.json.Decoder(GuidedState, dec_hook=lambda _, row: np.array(row))
         try:
             while True:
                 self._states.put(decoder.decode(self._line()))
         except (PriorReinforceError, msgspec.MsgspecError, ValueError) as error:
             self._states.put(ConfigurationError(str(error)))
 
-    def next(self, time_limit: float) -> State | None:
+    def next(self, time_limit: float) -> GuidedState | None:
         """The next state; None if none came within the limit, in [s].
 
         Raises:
@@ -164,7 +154,8 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the end of the input tells
 
     def say(content: object) -> None:
-        sys.stdout.buffer.write(msgspec.json.encode(content) + b"\n")
+        text = msgspec.json.encode(content, enc_hook=lambda array: array.tolist())
+        sys.stdout.buffer.write(text + b"\n")
         sys.stdout.buffer.flush()
 
     with suppress(BrokenPipeError):
@@ -173,7 +164,7 @@ def main() -> None:
             try:
                 say(executor.describe())
                 for state in executor.guide():
-                    say(State(state.t, state.commanded.tolist(), state.measured.tolist()))
+                    say(state)
                     if select.select([sys.stdin], [], [], 0)[0]:
                         break
             finally:
