@@ -59,7 +59,7 @@ def test_the_schema_is_stable():
     assert {n: len(f) for n, f in fields.items()} == {
         "StatusView": 23,
         "GoalView": 8,
-        "TrialView": 22,
+        "TrialView": 23,
         "AskView": 6,
         "AdviceView": 11,
         "InspectView": 9,

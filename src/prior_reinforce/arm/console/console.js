@@ -647,9 +647,7 @@ async function download(trial) {
 
 function chance(trial) {
   if (trial.p_hit === null) return null;
-  const n = trial.expected_trials;
-  const togo = n === null ? "" : `${n > 10 ? "more than 10" : n.toFixed(1)} trials to go`;
-  return h("p", { class: "chance", id: "chance" }, `A hit is ${trial.chance} `, h("small", {}, togo));
+  return h("p", { class: "chance", id: "chance" }, `A hit is ${trial.chance} `, h("small", {}, trial.to_go && `${trial.to_go} trials to go`));
 }
 function surprise(trial) {
   const before = S.trials.slice(0, trial.number - 1).reverse().find((each) => each.stage === "told");

@@ -29,6 +29,7 @@ from prior_reinforce.wording import (
     say_place,
     say_reading,
     say_tolerance,
+    say_trials,
 )
 
 _TRIALS_SHOWN = 3
@@ -90,6 +91,8 @@ class TrialView(View, frozen=True):
     """The same in a word, which is what it can be trusted to."""
     expected_trials: float | None
     """Trials until the goal is reached, this one included, likewise."""
+    to_go: str | None
+    """The same in words: `about 2.2`, or `more than 10`, beyond which it is a guess."""
     surprise: str | None
     """What is odd about what was told of it."""
     outdated: bool
@@ -237,6 +240,7 @@ def trial_view(now: Standing, store: Store, trial: Trial) -> TrialView:
         p_hit=trial.p_hit,
         chance=None if trial.p_hit is None else say_chance(trial.p_hit),
         expected_trials=trial.expected_trials,
+        to_go=None if trial.expected_trials is None else say_trials(trial.expected_trials),
         surprise=trial.surprise or None,
         outdated=trial.outdated,
         model=trial.model,
