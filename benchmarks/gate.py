@@ -17,7 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from prior_reinforce import make_task
-from prior_reinforce.arm.robots import check_plan, robot_limits
+from prior_reinforce.arm.robots.gate import check_plan
+from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.arm.robots.report import LimitReport
 from prior_reinforce.generators import load_generator, make_generator
 from prior_reinforce.plans.motions import Plan

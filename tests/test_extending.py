@@ -16,7 +16,7 @@ from prior_reinforce.arm.executing import EXECUTORS
 from prior_reinforce.arm.executing.base import ArmSettings
 from prior_reinforce.arm.executing.drive import Request, drive
 from prior_reinforce.arm.executing.result import measure_tracking
-from prior_reinforce.arm.robots import GateSettings
+from prior_reinforce.arm.robots.gate_settings import GateSettings
 from prior_reinforce.cli import main
 from prior_reinforce.generators import GENERATORS, Timed, load_generator, make_generator
 from prior_reinforce.perception import PERCEPTIONS, make_perception

@@ -42,7 +42,8 @@ from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 from scipy.signal import lfilter
 
 from prior_reinforce.adapters import make_adapter
-from prior_reinforce.arm.robots import check_plan, robot_limits
+from prior_reinforce.arm.robots.gate import check_plan
+from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.generators import DiffusionConfig, DiffusionGenerator, Generator, UNetSize
 from prior_reinforce.generators.base import Wrapper
 from prior_reinforce.perception import make_perception

@@ -21,9 +21,10 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from prior_reinforce.arm.executing.base import begin_at
-from prior_reinforce.arm.robots import RobotLimits, check_plan, robot_limits
+from prior_reinforce.arm.robots.gate import check_plan
+from prior_reinforce.arm.robots.limits import RobotLimits
 from prior_reinforce.arm.robots.plan_files import resample_plan, write_plan
-from prior_reinforce.arm.robots.presets import PRESETS
+from prior_reinforce.arm.robots.presets import PRESETS, robot_limits
 from prior_reinforce.arm.robots.urdf import read_urdf
 from prior_reinforce.errors import InvalidPlanError
 from prior_reinforce.plans.motions import Plan

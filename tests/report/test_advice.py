@@ -13,8 +13,8 @@ def test_where_a_first_throw_hits_is_dark(tmp_path):
     pictures = []
     for p in (0.0, 1.0):
         path = draw_advice(
-            tmp_path / f"{p}.png", grid, np.full(6, p), grid[:2], grid[2], grid[3], grid[4],
-            OutcomeFormat.metres(2),
+            tmp_path / f"{p}.png", OutcomeFormat.metres(2), grid[:2], goals=grid,
+            p_hit=np.full(6, p), goal=grid[2], throw=grid[3], demonstration=grid[4],
         )  # fmt: skip
         pictures.append(np.asarray(Image.open(path).convert("RGB")).mean())
     assert pictures[0] > pictures[1] + 20
@@ -27,8 +27,8 @@ def test_what_the_shades_and_the_axes_mean_is_said(tmp_path, monkeypatch):
     )
     grid = np.stack(np.meshgrid([0.8, 0.9, 1.0], [-0.2, 0.2], indexing="ij"), -1).reshape(-1, 2)
     draw_advice(
-        tmp_path / "a.png", grid, np.full(6, 0.5), grid[:2], grid[2], grid[3], grid[3],
-        OutcomeFormat.metres(2),
+        tmp_path / "a.png", OutcomeFormat.metres(2), grid[:2], goals=grid,
+        p_hit=np.full(6, 0.5), goal=grid[2], throw=grid[3], demonstration=grid[3],
     )  # fmt: skip
     (axes,) = figures[0].axes
     assert axes.get_xlabel() == "← left      y [cm]      right →"

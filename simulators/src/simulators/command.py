@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 import tyro
 
-from prior_reinforce.commands.live import say_outcome
 from prior_reinforce.commands.simulated import TaskChoice
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.files import claim_folder, named_disk_errors
@@ -131,7 +130,8 @@ class Simulate:
             if not rollout.valid:
                 print("the object went where no outcome is; by eye: lost", flush=True)
                 return
-            said = say_outcome(rollout.outcome, form, digits=4)
+            numbers = zip(form.names, rollout.outcome, form.units, strict=True)
+            said = ", ".join(f"{name} {value:.4f} {unit}" for name, value, unit in numbers)
             if self.goal:
                 seen = eye.perceive(rollout, goal, np.random.default_rng(0))
                 hit = in_tolerances(rollout.outcome - goal, form.tolerance) <= 1

@@ -81,7 +81,15 @@ class Advise(OnWorkspace):
             from prior_reinforce.report.advice import draw_advice
 
             picture = draw_advice(
-                out, goals, p, outcomes, session.goal, throw, demonstration, form, reached
+                out,
+                form,
+                outcomes,
+                reached,
+                goals=goals,
+                p_hit=p,
+                goal=session.goal,
+                throw=throw,
+                demonstration=demonstration,
             )
         if self.json:
             record = AdviceView(
@@ -111,13 +119,11 @@ class Advise(OnWorkspace):
                 f"the throw that teaches most: {say_place(throw, form)} ({throws.max():.0%} of "
                 f"what is unknown; half of all places teach less than {np.median(throws):.0%})"
             )
-        if moved:
-            pass
-        elif demonstration is None:
-            print("one more demonstration here would teach nothing that trials do not")
-        else:
+        if demonstration is not None:
             place = f"{say_place(demonstration, form)} ({shown.max():.0%} of what is unknown)"
             print(f"the demonstration that teaches most: one that ends at {place}")
+        elif not moved:
+            print("one more demonstration here would teach nothing that trials do not")
         if picture is not None:
             print(f"picture: {picture}")
 
@@ -136,7 +142,7 @@ class Advise(OnWorkspace):
             assert workspace.state.training is not None
             out = self.out or reach_picture(workspace.folder, workspace.state.training.model)
             shown = workspace.demonstrations.outcomes_seen
-            print(f"picture: {draw_advice(out, None, None, shown, None, None, None, form, region)}")
+            print(f"picture: {draw_advice(out, form, shown, region)}")
         print_next(workspace)
 
 

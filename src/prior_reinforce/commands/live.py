@@ -14,9 +14,8 @@ from rich.progress import BarColumn, Progress, TextColumn
 from rich.text import Text
 
 from prior_reinforce.arrays import Point
-from prior_reinforce.commands.questions import answer_to
-from prior_reinforce.errors import InvalidFeedbackError, PerceptionFailedError
-from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.commands.questions import answer_to, until_read
+from prior_reinforce.errors import PerceptionFailedError
 from prior_reinforce.parsing import from_words
 from prior_reinforce.readings import Reading
 from prior_reinforce.terminal import plain
@@ -96,12 +95,6 @@ def trials_by_goal(results: Sequence[GoalTrials]) -> str:
     return ", ".join(str(r.solved_at or f"{len(r.trials)}+") for r in results)
 
 
-def say_outcome(outcome: Point, form: OutcomeFormat, *, digits: int = 3) -> str:
-    """Say where an object ended, in numbers: `x 0.920 m, y 0.100 m`."""
-    components = zip(form.names, outcome, form.units, strict=True)
-    return ", ".join(f"{name} {value:.{digits}f} {unit}" for name, value, unit in components)
-
-
 def asking(
     console: Console, demonstrations: Demonstrations, perception: Perception
 ) -> FailedReading:
@@ -127,17 +120,13 @@ def asking(
         if (latest := getattr(perception, "latest", None)) is not None:
             say(console, f"  picture: {latest}")
         example = f'"{said}", or ' if (said := error_example(form)) else ""
-        while True:
-            try:
-                text = answer_to(
-                    f"  what was the error, seen from {say_place(goal, form)}? for instance "
-                    f"{example}hit: "
-                )
-                return from_words(text, form)
-            except EOFError as error:
-                raise PerceptionFailedError(f"{failure}; no answer came") from error
-            except InvalidFeedbackError as error:
-                say(console, f"  {error}")
+        question = (
+            f"  what was the error, seen from {say_place(goal, form)}? for instance {example}hit: "
+        )
+        try:
+            return until_read(partial(answer_to, question), lambda text: from_words(text, form))
+        except EOFError as error:
+            raise PerceptionFailedError(f"{failure}; no answer came") from error
 
     return ask
 

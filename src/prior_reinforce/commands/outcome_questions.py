@@ -23,12 +23,8 @@ from prior_reinforce.arm.recordings.outcomes import (
     read_outcomes,
 )
 from prior_reinforce.arm.recordings.selection import Selection
-from prior_reinforce.commands.questions import answer_to
-from prior_reinforce.errors import (
-    InvalidDemonstrationsError,
-    InvalidFeedbackError,
-    PriorReinforceError,
-)
+from prior_reinforce.commands.questions import answer_to, until_read
+from prior_reinforce.errors import InvalidDemonstrationsError, PriorReinforceError
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.parsing import read_uncertain_place
 from prior_reinforce.terminal import plain
@@ -101,16 +97,15 @@ def ask_place(ask: Callable[[], str], form: OutcomeFormat, *words: str) -> Place
     Raises:
         EOFError: `ask` gets no answer.
     """
-    while True:
-        text = ask().strip()
-        if text.lower() in words:
-            return text.lower()
-        try:
-            place, sd = read_uncertain_place(text, form)
-        except InvalidFeedbackError as error:
-            print(error, flush=True)
-        else:
-            return (*place.tolist(), sd)
+
+    def read(text: str) -> Place | str:
+        said = text.strip()
+        if said.lower() in words:
+            return said.lower()
+        place, sd = read_uncertain_place(said, form)
+        return (*place.tolist(), sd)
+
+    return until_read(ask, read)
 
 
 def _typed_before(folder: Path, source: Path, form: OutcomeFormat) -> tuple[Path, dict[str, Place]]:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import os
 import sys
 import time
+from collections.abc import Callable
 from contextlib import redirect_stdout, suppress
+from typing import TypeVar
 
-from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError
 from prior_reinforce.terminal import plain
 
+T = TypeVar("T")
 _SHOWN = 0.5
 """How long a question is on the screen before an answer counts, in [s] (ours): nobody reads it and
 types in less, and a network may bring what was typed before so late."""
@@ -23,6 +26,19 @@ def answer_to(question: str) -> str:
     """
     with redirect_stdout(sys.stderr):
         return input(question)
+
+
+def until_read(ask: Callable[[], str], read: Callable[[str], T]) -> T:
+    """Ask until an answer can be read; what is wrong with one is said.
+
+    Raises:
+        EOFError: `ask` gets no answer.
+    """
+    while True:
+        try:
+            return read(ask())
+        except (ConfigurationError, InvalidFeedbackError) as error:
+            print(plain(str(error)), flush=True)
 
 
 def answer_after(question: str, prompt: str) -> str:

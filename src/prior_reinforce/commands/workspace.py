@@ -6,6 +6,7 @@ import json
 import math
 import sys
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -13,7 +14,7 @@ import msgspec
 import tyro
 
 from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
-from prior_reinforce.arm.robots import RobotLimits
+from prior_reinforce.arm.robots.limits import RobotLimits
 from prior_reinforce.arm.robots.presets import PRESETS
 from prior_reinforce.arm.robots.urdf import bases_on_axis
 from prior_reinforce.arm.workspace.declared import WAYS, read_object
@@ -23,7 +24,7 @@ from prior_reinforce.arm.workspace.template import NewWorkspace
 from prior_reinforce.arm.workspace.view import trials_table
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.commands.base import Json, OnWorkspace, Words, print_json, print_next
-from prior_reinforce.commands.questions import answer_to
+from prior_reinforce.commands.questions import answer_to, until_read
 from prior_reinforce.errors import ConfigurationError, UnclearFlangeError
 from prior_reinforce.files import named_disk_errors
 from prior_reinforce.plans.kinematics import UPRIGHT, first_axis, leaning
@@ -100,16 +101,14 @@ class New(NewWorkspace):
             return self
         for way, means in WAYS.items():
             print(f"  {way:<9} {means}")
-        while True:
-            said = answer_to(
-                "where is the object before it leaves? one demonstration is then enough [none]: "
-            )
-            try:
-                where = read_object(said.strip() or "none")
-                break
-            except ConfigurationError as error:
-                print(error)
-        asked = replace(self, symmetry=said.strip() or "none")
+        question = "where is the object before it leaves? one demonstration is then enough [none]: "
+
+        def read(said: str) -> tuple[str, str | tuple[float, float]]:
+            said = said.strip() or "none"
+            return said, read_object(said)
+
+        said, where = until_read(partial(answer_to, question), read)
+        asked = replace(self, symmetry=said)
         if where in ("anywhere", "none") or self.robot == "none" or self.box or self.no_box:
             return asked
         corners = answer_to(

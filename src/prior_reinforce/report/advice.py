@@ -22,27 +22,28 @@ from prior_reinforce.wording import CHANCES, say_chance
 @style.drawing()
 def draw_advice(
     path: Path,
-    goals: Points | None,
-    p_hit: Float[np.ndarray, " n"] | None,
-    demonstrated: Float[np.ndarray, "N k"],
-    goal: Point | None,
-    throw: Point | None,
-    demonstration: Point | None,
     form: OutcomeFormat,
+    demonstrated: Float[np.ndarray, "N k"],
     reached: Reach | None = None,
+    *,
+    goals: Points | None = None,
+    p_hit: Float[np.ndarray, " n"] | None = None,
+    goal: Point | None = None,
+    throw: Point | None = None,
+    demonstration: Point | None = None,
 ) -> Path:
     """Draw it.
 
     Args:
         path: PNG.
+        form: What the two components are.
+        demonstrated: Outcomes of the demonstrations.
+        reached: Which goals can be reached; what cannot is hatched.
         goals: A grid, shape (n, 2), the second component fastest; None shows what is reached.
         p_hit: Probability that a first throw hits each; None without goals.
-        demonstrated: Outcomes of the demonstrations.
         goal: That is set; None before one is.
         throw: Goal of the throw that teaches most; None if none does.
         demonstration: Where the demonstration that teaches most ends; None if none would teach.
-        form: What the two components are.
-        reached: Which goals can be reached; what cannot is hatched.
 
     Returns:
         The path.

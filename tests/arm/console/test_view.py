@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.arm.console.view import motion_of, state_of
-from prior_reinforce.arm.robots import robot_limits
+from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.arm.workspace.events import Moved, Moving
 from prior_reinforce.arm.workspace.execute import _begin, _end
 from prior_reinforce.arm.workspace.template import NewWorkspace

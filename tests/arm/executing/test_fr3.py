@@ -12,7 +12,7 @@ import pytest
 
 from prior_reinforce.arm.executing.drive import approach
 from prior_reinforce.arm.executing.fr3 import FR3, FR3Config
-from prior_reinforce.arm.robots import robot_limits
+from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.errors import ConfigurationError, RobotLimitError
 from prior_reinforce.plans.interpolation import interpolate
 from prior_reinforce.plans.motions import Plan

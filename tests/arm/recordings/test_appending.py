@@ -10,7 +10,7 @@ from prior_reinforce.arm.recordings.inspection import Wanted, inspect
 from prior_reinforce.arm.recordings.preprocessing import Preprocessing
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.selection import Selection
-from prior_reinforce.arm.robots import robot_limits
+from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.plan_format import PlanFormat

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.arm.recordings import import_demonstrations
-from prior_reinforce.arm.robots import robot_limits
+from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.errors import InvalidDemonstrationsError
 from tests.arm.recordings.recorded import JOINTS, OUTCOMES, N, sampled
 

@@ -7,7 +7,7 @@ import pytest
 
 from prior_reinforce.arm.recordings import Preprocessing, import_demonstrations, inspect_recordings
 from prior_reinforce.arm.recordings.inspection import acceleration_of, say_small
-from prior_reinforce.arm.robots import robot_limits
+from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.plans.interpolation import join_frames
 from tests.arm.recordings.recorded import JOINTS, N, sampled, write_npz, write_outcomes
 

@@ -20,7 +20,7 @@ from prior_reinforce.arm.recordings import (
 from prior_reinforce.arm.recordings.naming import find_channels
 from prior_reinforce.arm.recordings.outcome_units import in_units
 from prior_reinforce.arm.recordings.outcomes import read_outcomes
-from prior_reinforce.arm.robots import robot_limits
+from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.errors import FileFormatError, UnclearUnitsError
 from tests.arm.recordings.recorded import lerobot_set
 

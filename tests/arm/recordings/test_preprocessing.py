@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from prior_reinforce.arm.recordings import import_demonstrations
 from prior_reinforce.arm.recordings.preprocessing import Preprocessing, preprocess
 from prior_reinforce.arm.recordings.recording import Recording
-from prior_reinforce.arm.robots import robot_limits
+from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.errors import (
     ConfigurationError,
     InvalidDemonstrationsError,

@@ -14,7 +14,7 @@ import zarr
 
 from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
 from prior_reinforce.arm.recordings.beside import moving_beside
-from prior_reinforce.arm.robots import robot_limits
+from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.errors import (
     FileFormatError,
     InvalidDemonstrationsError,

@@ -6,7 +6,7 @@ import pytest
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.selection import select
 from prior_reinforce.arm.recordings.turns import aligned
-from prior_reinforce.arm.robots import RobotLimits
+from prior_reinforce.arm.robots.limits import RobotLimits
 from prior_reinforce.errors import InvalidDemonstrationsError
 
 T = np.arange(100) / 100

@@ -9,9 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import prior_reinforce.simulation.tasks
-from prior_reinforce.arm.robots import GateSettings, RobotLimits, check_plan, robot_limits
-from prior_reinforce.arm.robots.gate import beyond_band
+from prior_reinforce.arm.robots.gate import beyond_band, check_plan
+from prior_reinforce.arm.robots.gate_settings import GateSettings
+from prior_reinforce.arm.robots.limits import RobotLimits
 from prior_reinforce.arm.robots.plan_files import resample_plan
+from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.errors import ConfigurationError, InvalidPlanError, RobotLimitError
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.generators import make_generator

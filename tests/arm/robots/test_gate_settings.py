@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.arm.robots import GateSettings
+from prior_reinforce.arm.robots.gate_settings import GateSettings
 from prior_reinforce.errors import ConfigurationError
 
 

@@ -5,8 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from prior_reinforce.arm.robots import RobotLimits, match_joints, missing_joints, robot_limits
-from prior_reinforce.arm.robots.limits import is_joint, joint_of, other_quantities
+from prior_reinforce.arm.robots.limits import (
+    RobotLimits,
+    is_joint,
+    joint_of,
+    match_joints,
+    missing_joints,
+    other_quantities,
+)
+from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.errors import ConfigurationError, InvalidPlanError
 from prior_reinforce.plans.plan_format import PlanFormat
 

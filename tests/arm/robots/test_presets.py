@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.arm.robots import match_joints, robot_limits
+from prior_reinforce.arm.robots.limits import match_joints
+from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.kinematics import tool_tip
 from prior_reinforce.plans.plan_format import PlanFormat

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from prior_reinforce.arm.robots import LimitLine, LimitReport
+from prior_reinforce.arm.robots.report import LimitLine, LimitReport
 from prior_reinforce.errors import RobotLimitError
 
 FAST = LimitLine(

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from prior_reinforce.arm.robots import robot_limits
+from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.arm.robots.urdf import bases_on_axis, read_urdf
 from prior_reinforce.errors import ConfigurationError, FileFormatError, UnclearFlangeError
 from prior_reinforce.plans.kinematics import rotation, tool_tip

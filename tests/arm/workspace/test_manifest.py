@@ -11,7 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from prior_reinforce.arm.robots import robot_limits
+from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.arm.workspace.manifest import parse_manifest, read_text
 from prior_reinforce.arm.workspace.template import NewWorkspace
 from prior_reinforce.errors import ConfigurationError, FileFormatError

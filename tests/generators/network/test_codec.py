@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from prior_reinforce.arm.robots import check_plan, robot_limits
+from prior_reinforce.arm.robots.gate import check_plan
+from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.generators.network.codec import PlanCodec
 from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.plans.plan_format import PlanFormat

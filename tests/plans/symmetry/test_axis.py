@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import prior_reinforce as pr
-from prior_reinforce.arm.robots import match_joints, robot_limits
+from prior_reinforce.arm.robots.limits import match_joints
+from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.plans.symmetry import Polar, TurnPoses, find_axis, hand_paths, turn_and_scale
 from prior_reinforce.plans.symmetry.moves import about_vertical
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.arm.robots import check_plan, robot_limits
+from prior_reinforce.arm.robots.gate import check_plan
+from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.plans.motions import Plan
 from prior_reinforce.simulation.tasks import make_task
 from prior_reinforce.simulation.tasks.basketball import BasketballShot

@@ -12,18 +12,25 @@ from __future__ import annotations
 import itertools
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 from jaxtyping import Float
+from typing_extensions import Self
 
 from prior_reinforce.plans.motions import Plan
 
 _BLEND = 0.2
 """Within this time, in [s], a motion goes from where the arm stands over to its plan. Ours: of the
 2 mrad that may be left, 0.3 rad/s^2."""
+START_TOLERANCE = 0.005
+"""Of a joint from a plan's first frame, in [rad], at which a motion is begun. Ours: what a servo at
+rest is off, and the whole of what a path may be off its plan."""
+_MOVED = 0.002
+"""Distance of a joint from where it stood that counts as having moved, in [rad]. Ours: ten times
+what a joint that is held shows."""
 GUIDED_RATE = 200.0
 """Most states a second that are read of a guided arm. Ours: ten a frame of the shortest plans."""
 Motion = Literal["trial", "rehearsal", "approach"]
@@ -90,6 +97,18 @@ class MeasuredPath:
     """Why the plan was not executed to its end, in the arm's words."""
     moved: bool = True
     """Whether the arm moved, or may have."""
+
+    @classmethod
+    def of(
+        cls, rows: Sequence[tuple[float, list[float]]], d: int, fault: str = "", moved: bool = True
+    ) -> Self:
+        """What is in rows of t and q, of d channels; there may be none."""
+        q = np.array([q for _, q in rows]).reshape(len(rows), d)
+        return cls(np.array([t for t, _ in rows]), q, fault, moved)
+
+    def left(self, before: Float[np.ndarray, " d"], after: Float[np.ndarray, " d"]) -> bool:
+        """Whether an arm of joints left a pose, on the path or by where it stands after it."""
+        return bool(np.abs(np.vstack([self.q, after]) - before).max() > _MOVED)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import gc
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +19,7 @@ from jaxtyping import Float
 
 from prior_reinforce.arm.executing.base import (
     GUIDED_RATE,
+    START_TOLERANCE,
     ArmDescription,
     Executor,
     GuidedState,
@@ -38,17 +39,10 @@ if TYPE_CHECKING:
 _HOLD = 0.15
 """How long the last pose is held before the motion is said to have ended, in [s]: the arm comes to
 rest in it. Ours; the simulated arm needs a tenth of it."""
-_START_TOLERANCE = 0.005
-"""From the plan's first frame at which a motion is begun, in [rad]; ours: what a servo at rest is
-off, and the whole of what a path may be off its plan."""
 _SAME = 1e-9
 """Distance of a joint that is rounding, in [rad]."""
-_MOVED = 0.002
-"""Distance of a joint from where it stood that counts as having moved, in [rad]. Ours: ten times
-what a joint that is held shows."""
 _USUAL_THRESHOLDS = 20.0, 20.0
 """In [Nm] and [N]: `setDefaultBehavior` of libfranka's examples."""
-_NOTHING = np.empty(0), np.empty((0, 7))
 _REALTIME = Path("/sys/kernel/realtime")
 """Says 1 on a kernel with PREEMPT_RT, which is what libfranka looks at."""
 
@@ -125,11 +119,11 @@ class FR3(Executor):
         rows: list[tuple[float, list[float]]] = []
         state = self._ready()
         before, held = np.array(state.q), np.array(state.q_d)
-        if (far := np.abs(held - plan.actions[0]).max()) > _START_TOLERANCE:
-            return MeasuredPath(*_NOTHING, f"it stands {far:.4f} rad off the plan", moved=False)
+        if (far := np.abs(held - plan.actions[0]).max()) > START_TOLERANCE:
+            return MeasuredPath.of([], 7, f"it stands {far:.4f} rad off the plan", moved=False)
         sent = begin_at(plan, held)
         if far > _SAME and (refused := check_plan(sent, self._limits).refusals):
-            return MeasuredPath(*_NOTHING, f"from where it stands, {refused}", moved=False)
+            return MeasuredPath.of([], 7, f"from where it stands, {refused}", moved=False)
         set_points = interpolate(sent.actions, sent.format.dt, hold_after=_HOLD).q
         gc.collect()
         gc.disable()  # a collection takes longer than a cycle
@@ -140,16 +134,14 @@ class FR3(Executor):
             fault = _line(error)
         finally:
             gc.enable()
-        t = np.array([t for t, _ in rows])
-        q = np.array([q for _, q in rows]).reshape(len(rows), 7)
+        path = MeasuredPath.of(rows, 7, fault)
         try:
             after = np.array(self._recover().q)
             if self._config.collision_thresholds is not None:
                 self._set_collision_thresholds(_USUAL_THRESHOLDS)
-            moved = bool(np.abs(np.vstack([q, after]) - before).max() > _MOVED)
+            return replace(path, moved=path.left(before, after))
         except self._errors as error:
-            fault, moved = f"{fault}; then {_line(error)}".removeprefix("; "), True
-        return MeasuredPath(t, q, fault, moved)
+            return replace(path, fault=f"{fault}; then {_line(error)}".removeprefix("; "))
 
     def _stream(self, set_points: list[list[float]], rows: list[tuple[float, list[float]]]) -> str:
         """Send set points by the robot's clock, and note where it is; why it ended early."""

@@ -208,9 +208,8 @@ class LeRobotArm(Executor):
         # What lags a plan on purpose is that plan, later.
         shift = self._config.lag if self._config.goals == "as planned" else 0.0
         joints = np.array(self._units) == "rad"
-        times: list[float] = []
-        path: list[Float[np.ndarray, " d"]] = []
-        sent: list[Float[np.ndarray, " d"]] = []
+        rows: list[tuple[float, list[float]]] = []
+        sent: list[int] = []
         fault, moved, cycle, start = "", False, 0, time.monotonic()
         try:
             while cycle < len(goals):
@@ -223,42 +222,40 @@ class LeRobotArm(Executor):
                     if np.any(np.abs(goals[now] - goals[cycle])[joints] > _LARGEST_GAP):
                         fault = f"a goal was {late * 1e3:.0f} ms late; the computer is too busy"
                     cycle = now
-                goal, there = goals[cycle], expected[cycle]
-                cycle += 1
                 if self._stop:
                     fault = "it was asked to stop"
                 if fault:
                     break
                 moved = True
-                asked = self._named(goal)
+                asked = self._named(goals[cycle])
                 said = self._ask("move", goal=asked)
                 here = self._vector(said["measured"])
                 if not np.isfinite(here).all():  # nor is it known where to hold the arm then
                     name = self._columns[int(np.isfinite(here).argmin())]
                     fault = f"LeRobot does not say where {name} is"
                     break
-                times.append((time.monotonic() - start if wall else due) - shift)
-                path.append(here)
-                sent.append(goal)
+                rows.append(((time.monotonic() - start if wall else due) - shift, here.tolist()))
+                sent.append(cycle)
                 worst = max(asked, key=lambda name: abs(said["sent"][name] - asked[name]))
                 if abs(said["sent"][worst] - asked[worst]) > _CLIPPED:
                     fault = (
                         f"LeRobot sent {worst} {said['sent'][worst]:.4g} instead of "
                         f"{asked[worst]:.4g}; take max_relative_target out of robot"
                     )
-                deviation = np.where(joints, np.abs(here - there), 0.0)
+                deviation = np.where(joints, np.abs(here - expected[cycle]), 0.0)
                 if deviation.max() > _PATH_TOLERANCE:
                     name = self._columns[int(deviation.argmax())]
                     fault = f"{name} is {deviation.max():.2f} rad from where it should be"
-            if fault and path:
-                self._ask("move", goal=self._named(path[-1]))  # held where it was seen last
+                cycle += 1
+            if fault and rows:  # held where it was seen last
+                self._ask("move", goal=self._named(np.array(rows[-1][1])))
         except ConfigurationError as error:
             fault = str(error) if not fault else f"{fault}; {error}"
-        q = np.array(path) if path else np.empty((0, len(self._columns)))
+        path = MeasuredPath.of(rows, len(self._columns), fault, moved)
         if not fault and np.ptp(goals[:, joints], axis=0).max() > _LEAST_TRAVEL:
-            behind = lag_behind(np.array(times), np.array(sent)[:, joints], q[:, joints])
+            behind = lag_behind(path.t, goals[sent][:, joints], path.q[:, joints])
             print(f"the arm followed its goals {behind * 1e3:.0f} ms behind", flush=True)
-        return MeasuredPath(np.array(times), q, fault, moved)
+        return path
 
     def stop(self) -> None:
         """See `Executor`."""

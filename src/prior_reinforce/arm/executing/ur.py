@@ -16,7 +16,12 @@ import msgspec
 import numpy as np
 from jaxtyping import Float
 
-from prior_reinforce.arm.executing.base import ArmDescription, Executor, MeasuredPath
+from prior_reinforce.arm.executing.base import (
+    START_TOLERANCE,
+    ArmDescription,
+    Executor,
+    MeasuredPath,
+)
 from prior_reinforce.arm.executing.result import lag_behind
 from prior_reinforce.arm.robots.gate import check_plan
 from prior_reinforce.arm.robots.plan_files import resample_plan
@@ -41,9 +46,6 @@ controller's watchdog, which stops the program. Ours: an arm is at its last set 
 _HOLD = 0.3
 """How long the last pose is held before the motion is said to have ended, in [s]: the arm comes to
 rest in it. Ours, beyond five times the lag."""
-_START_TOLERANCE, _MOVED = 0.005, 0.002
-"""Of a joint, in [rad], as for the FR3: from the first frame at which a motion is begun, and from
-where it stood that counts as having moved."""
 _POLL = 1e-4
 
 
@@ -135,15 +137,14 @@ class UR(Executor):
         import rtde_control
 
         before = self.where()
-        if (far := np.abs(before - plan.actions[0]).max()) > _START_TOLERANCE:
-            fault = f"it stands {far:.4f} rad off the plan"
-            return MeasuredPath(np.empty(0), np.empty((0, 6)), fault, moved=False)
+        if (far := np.abs(before - plan.actions[0]).max()) > START_TOLERANCE:
+            return MeasuredPath.of([], 6, f"it stands {far:.4f} rad off the plan", moved=False)
         times, goals = self._set_points(plan)
         rows: list[tuple[float, list[float]]] = []
         try:
             control = rtde_control.RTDEControlInterface(self._config.host)
         except RuntimeError as error:
-            return MeasuredPath(np.empty(0), np.empty((0, 6)), str(error), moved=False)
+            return MeasuredPath.of([], 6, str(error), moved=False)
         try:
             control.setWatchdog(1 / _SILENCE)
             fault = self._servo(control, goals.tolist(), rows)
@@ -152,16 +153,15 @@ class UR(Executor):
             after = np.array(self._state.getActualQ())
             control.stopScript()
         except RuntimeError as error:  # the watchdog brings the arm to rest
-            return MeasuredPath(*_path(rows), f"the robot does not answer: {error}")
+            return MeasuredPath.of(rows, 6, f"the robot does not answer: {error}")
         finally:
             control.disconnect()
-        t, q = _path(rows)
-        if not fault and len(t):
-            sent = np.array([np.interp(t, times, column) for column in goals.T]).T
-            behind = lag_behind(t, sent, q)
+        path = MeasuredPath.of(rows, 6, fault)
+        if not fault and rows:
+            sent = np.array([np.interp(path.t, times, column) for column in goals.T]).T
+            behind = lag_behind(path.t, sent, path.q)
             print(f"the arm followed its set points {behind * 1e3:.0f} ms behind", flush=True)
-        moved = bool(np.abs(np.vstack([q, after]) - before).max() > _MOVED)
-        return MeasuredPath(t, q, fault, moved)
+        return replace(path, moved=path.left(before, after))
 
     def _servo(
         self,
@@ -207,9 +207,3 @@ class UR(Executor):
     def close(self) -> None:
         """Disconnect."""
         self._state.disconnect()
-
-
-def _path(
-    rows: list[tuple[float, list[float]]],
-) -> tuple[Float[np.ndarray, " T"], Float[np.ndarray, "T 6"]]:
-    return np.array([t for t, _ in rows]), np.array([q for _, q in rows]).reshape(len(rows), 6)

@@ -35,7 +35,8 @@ from prior_reinforce.arm.recordings.selection import Selection, select
 from prior_reinforce.arm.recordings.starts import ways_back
 from prior_reinforce.arm.recordings.takes import doubts_of_times
 from prior_reinforce.arm.recordings.units import Ambiguity, listed, raise_if_ambiguous
-from prior_reinforce.arm.robots import GateSettings, RobotLimits
+from prior_reinforce.arm.robots.gate_settings import GateSettings
+from prior_reinforce.arm.robots.limits import RobotLimits
 from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidDemonstrationsError
 from prior_reinforce.extras import check_installed
 from prior_reinforce.formats import OutcomeFormat

@@ -22,8 +22,9 @@ from prior_reinforce.arm.recordings.selection import Selection
 from prior_reinforce.arm.recordings.starts import all_return, odd_starts
 from prior_reinforce.arm.recordings.turns import aligned
 from prior_reinforce.arm.recordings.units import Ambiguity, say_names
-from prior_reinforce.arm.robots import GateSettings, RobotLimits, check_plan
-from prior_reinforce.arm.robots.limits import match_joints
+from prior_reinforce.arm.robots.gate import check_plan
+from prior_reinforce.arm.robots.gate_settings import GateSettings
+from prior_reinforce.arm.robots.limits import RobotLimits, match_joints
 from prior_reinforce.arm.robots.report import LimitLine, LimitReport
 from prior_reinforce.errors import ConfigurationError, InvalidPlanError
 from prior_reinforce.plans.interpolation import RATE

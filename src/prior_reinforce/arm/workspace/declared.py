@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
 
-from prior_reinforce.arm.robots import RobotLimits, match_joints
+from prior_reinforce.arm.robots.limits import RobotLimits, match_joints
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.symmetry import Symmetry, declare_symmetry

@@ -19,14 +19,9 @@ from msgspec import Meta, Struct, structs
 
 from prior_reinforce.arm.executing import EXECUTORS
 from prior_reinforce.arm.executing.base import ArmSettings
-from prior_reinforce.arm.robots import (
-    GateSettings,
-    RobotLimits,
-    match_joints,
-    missing_joints,
-    robot_limits,
-)
-from prior_reinforce.arm.robots.limits import with_turns
+from prior_reinforce.arm.robots.gate_settings import GateSettings
+from prior_reinforce.arm.robots.limits import RobotLimits, match_joints, missing_joints, with_turns
+from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.arm.workspace.declared import DeclaredSymmetry
 from prior_reinforce.errors import (
     ConfigurationError,

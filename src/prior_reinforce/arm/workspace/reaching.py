@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from prior_reinforce.arm.robots import RobotLimits, match_joints
+from prior_reinforce.arm.robots.limits import RobotLimits, match_joints
 from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.errors import OutOfReachError
 from prior_reinforce.generators.reach import (
@@ -85,7 +85,8 @@ def reach_check(workspace: Workspace) -> Check:
     def check(plan: Frames, goal: Point) -> str:
         if moved is not None and np.any(shown.far_outside(goal)):
             return f"it is nearer or farther than motions are moved ({moved.name})"
-        return workspace.refusals(plan, goal)
+        verdict = workspace.gate(plan, goal)
+        return "" if verdict is None else verdict.refusals
 
     return check
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from prior_reinforce.arm.robots import RobotLimits, robot_limits
-from prior_reinforce.arm.robots.presets import GRIPPERS, PRESETS
+from prior_reinforce.arm.robots.limits import RobotLimits
+from prior_reinforce.arm.robots.presets import GRIPPERS, PRESETS, robot_limits
 from prior_reinforce.arm.robots.urdf import read_urdf
 from prior_reinforce.arm.workspace.declared import read_object
 from prior_reinforce.arm.workspace.manifest import LIMIT_LISTS, UNKNOWN

@@ -208,11 +208,6 @@ class Workspace:
             goal, carry_over=carry_over, adapter=adapter, new_hardware=new_hardware
         )
 
-    def refusals(self, frames: Frames, condition: Point) -> str:
-        """Why the gate refuses a plan for a condition; empty where it does not."""
-        verdict = self.gate(frames, condition)
-        return "" if verdict is None else verdict.refusals
-
     def gate(self, frames: Frames, condition: Point, dt: float | None = None) -> LimitReport | None:
         """Hold a plan against the robot's limits of now; None where the manifest names no robot.
 
