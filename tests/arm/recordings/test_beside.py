@@ -7,7 +7,6 @@ from prior_reinforce.arm.recordings import read_recordings
 from prior_reinforce.arm.recordings.beside import (
     arrays_beside,
     columns_beside,
-    is_clock,
     moving_beside,
     twin_vectors,
 )
@@ -103,22 +102,6 @@ def test_numbered_columns_beside_are_one_group():
     names = [*UR, *(f"{stem}_{i}" for stem in ("left", "target") for i in range(3))]
     values = np.column_stack([Q, -Q, Q + 0.001])
     assert moving(columns_beside(names, values, range(3), T)) == {"left_0 to left_2"}
-
-
-@pytest.mark.parametrize(
-    ("name", "values", "clock"),
-    [
-        ("x", 5 + T, True),
-        ("x", 1e9 * T, True),
-        ("x", 1.1 * T, False),
-        ("x", T**2, False),
-        ("x", np.arange(101.0), True),
-        ("frame", np.cumsum(1.0 + np.arange(101) % 3), True),
-        ("x", 2.0 * np.arange(101), False),
-    ],
-)
-def test_a_clock_runs_with_the_times_and_a_rail_does_not(name, values, clock):
-    assert is_clock(name, values, T) == clock
 
 
 def test_a_command_beside_what_was_measured_is_asked_about(tmp_path):

@@ -5,10 +5,7 @@ import pytest
 
 from prior_reinforce.arm.recordings.clock import (
     clock_of,
-    counts_down,
     declared_rate,
-    skips_frames,
-    tells_time,
 )
 from prior_reinforce.errors import (
     ConfigurationError,
@@ -181,9 +178,6 @@ def test_a_time_that_counts_down_is_named(rate):
     says = "time_to_release falls with every frame, as what counts down does"
     with pytest.raises(InvalidDemonstrationsError, match=says):
         clock_of("a", 200, stamps=left, name="time_to_release", rate=rate)
-    assert counts_down("time_to_release", left)
-    assert not counts_down("fall", left)
-    assert not counts_down("t", -left)
 
 
 def test_a_rate_that_contradicts_the_name_of_a_recording_is_said():
@@ -198,7 +192,6 @@ def test_nanoseconds_since_2000_are_no_ticks(rate):
     stamps = 641_000_000_000_000_000 + np.arange(rate) * (1_000_000_000 // rate)
     clock = clock_of("a", rate, stamps=stamps, name="timestamp", time_unit="ns")
     assert clock.period == pytest.approx(1 / rate, rel=1e-3)
-    assert not tells_time("n", stamps)
 
 
 def test_a_stated_unit_is_believed_of_ticks():
@@ -212,13 +205,6 @@ def test_a_rate_settles_the_unit_of_times():
     stamps = np.arange(200) * 10.0
     clock = clock_of("a", 200, stamps=stamps, name="t", rate=100)
     assert (clock.ambiguities, clock.source) == ((), "t in ms")
-
-
-def test_counters_that_skip():
-    assert skips_frames(np.array([7.0, 8, 9, 21, 22]))
-    assert skips_frames(np.array([2.0, 4, 6, 12, 14]))
-    for other in ([1.0, 2, 3, 4], [1, 1, 2, 9], [0.5, 1.5, 2.5, 9.5], [1, 5, 7, 8, 20]):
-        assert not skips_frames(np.array(other))
 
 
 def test_what_has_no_use_is_refused():

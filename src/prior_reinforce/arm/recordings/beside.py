@@ -15,12 +15,11 @@ from itertools import combinations
 import numpy as np
 
 from prior_reinforce.arm.recordings.channels import measured_of
-from prior_reinforce.arm.recordings.clock import COUNTER, Times, says_time, tells_time
 from prior_reinforce.arm.recordings.naming import vectors
 from prior_reinforce.arm.recordings.recording import Beside, Positions, Recording
+from prior_reinforce.arm.recordings.time_finder import Times, is_clock, says_time, tells_time
 from prior_reinforce.arm.recordings.units import (
     CHANNEL_UNITS,
-    SECONDS,
     Ambiguity,
     say_names,
     split_unit,
@@ -61,8 +60,6 @@ _SIDE = re.compile(
 _FEWEST, _BENDS = 20, 6
 """Frames of what moves at a rate of its own and has no times, and how often it goes through its
 range at most; ours: tables of other things jump."""
-_SAME_CLOCK = 0.01
-"""Share by which two clocks of a recording differ at most. Ours."""
 
 
 def moving_beside(recordings: Iterable[Recording]) -> dict[str, tuple[float, float]]:
@@ -184,21 +181,6 @@ def may_move(name: str, width: int = 1) -> bool:
     other = (says_no_position(own) or says_time(own)) and not is_of_base(own)  # base_pose, base_T
     no_motion = other or MASK.fullmatch(own)
     return width <= _MOST_BESIDE and not no_motion and not _ELSE.search(name)
-
-
-def is_clock(name: str, values: Times, times: Times) -> bool:
-    """Whether a column tells the time or counts frames: by its name, or by how fast it rises."""
-    steps = np.diff(values)
-    seconds = times[-1] - times[0]
-    if len(steps) < 2 or not np.all(steps > 0) or seconds <= 0:
-        return False
-    whole = bool(np.all(values % 1 == 0))
-    if says_time(name) or (whole and (np.median(steps) == 1 or COUNTER.search(name.lower()))):
-        return True
-    rates = [(values[-1] - values[0]) * scale / seconds for scale in SECONDS.values()]
-    line = values[0] + (values[-1] - values[0]) * (times - times[0]) / seconds
-    near = np.abs(values - line).max() <= 3 * np.median(steps)
-    return bool(near and any(abs(rate - 1) < _SAME_CLOCK for rate in rates))
 
 
 def _moves(values: Times) -> bool:

@@ -4,40 +4,46 @@ from __future__ import annotations
 
 import math
 import re
-import shlex
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jaxtyping import Float, Shaped
 
 from prior_reinforce.arm.recordings.naming import OTHER_NAMES
+from prior_reinforce.arm.recordings.time_finder import (
+    COUNTER,
+    FASTEST,
+    FRAME,
+    LONGEST,
+    SHORTEST,
+    SLOWEST,
+    Columns,
+    FoundTimes,
+    Stamps,
+    Times,
+    are_ticks,
+    counts_all,
+    find_times,
+    is_periods,
+    other_times,
+    rises,
+    says_period,
+    says_time,
+    skips_frames,
+)
 from prior_reinforce.arm.recordings.units import SECONDS, Ambiguity, judge_unit, split_unit
 from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidDemonstrationsError
 
 if TYPE_CHECKING:
     from prior_reinforce.arm.recordings.options import ReadOptions
 
-Times = Float[np.ndarray, " T"]
-"""Times of T frames, in [s]."""
-Stamps = Shaped[np.ndarray, "..."]
-"""Times of T frames as a file holds them: in its unit, of any shape and kind."""
-FRAME = "frame"
-"""The unit of a column that counts frames; the rate says how long one is."""
 TIME_UNITS = (*SECONDS, FRAME)
 NO_COLUMN = "none"
 """Value of `time_column` by which no times are read, and of `episode_column`."""
 _CALLED = ("t", "time", "timestamp", "timestamps")
 """Names of arrays that are the times."""
-_SAYS_TIME = re.compile(
-    r"(^|[^a-z])(t|ts|times?|timestamps?|stamp|epoch|clock|elapsed|duration|date|secs?|seconds?)"
-    r"($|[^a-z])"
-    r"|[a-z]_?(time|stamp)(_?m?s|_?sec)?$|zeit|temps|tiempo|tempo|czas|sekund|secondes|segundos|врем"
-    r"|时间|時間|時刻|时刻|시간",
-    re.IGNORECASE,
-)
 _IN_BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*[^\W\d_][^\[\]()]*?)\s*[\])]\s*$")
 """`Time [weeks]`, a word in brackets."""
 _QUALIFIES = re.compile(
@@ -46,8 +52,6 @@ _QUALIFIES = re.compile(
 """Words that say what kind of time it is, and no unit."""
 _HERTZ = re.compile(r"(\d+(?:[.,]\d+)?)[ _-]?hz", re.I)
 """`throw_4_50Hz`."""
-_SHORTEST, LONGEST = 0.1, 60.0
-"""Seconds that a throw, slide or swing is recorded for. Ours, and wide on purpose."""
 SAME_RATE = 0.05
 """Rates that differ by a smaller share are one. Ours: clocks of recorders jitter and drift."""
 _NEARLY = 1.25
@@ -56,73 +60,10 @@ _APART = 3.0
 """Frames by which two clocks of one recording may differ. Ours: jitter is a frame or two."""
 _LOWEST_RATE, _HIGHEST_RATE = 1e-3, 1e6
 """Declared frames a second beyond which a file is damaged. Ours."""
-_SLOWEST, _FASTEST = 1.0, 1e4
-"""And beyond which a rate or a unit is doubted although the file or a person says it. Ours."""
-_TICKS = (6.3e17, 6.6e17)
-"""Numbers that are .NET's ticks of 100 ns since the year 1, from 1997 to 2092."""
-FEWEST_COUNTS = 20
-"""Frames of which it can be said that something counts them. Ours."""
-COUNTER = re.compile(
-    r"(^|[^a-z])(seq|frame|sample|index|idx|count|counter|tick|row|nr|step)s?($|[^a-z])"
-)
-"""Names of columns that count frames."""
 _RATE = re.compile(
     r"((control|sampl[a-z]*|frame|record[a-z]*)[ _]?)?(fps|fs|hz|rate|freq(uency)?)([ _]?hz)?"
 )
-_PERIOD = re.compile(
-    r"((control|sampl[a-z]*|frame)[ _]?)?(dt|period|time[ _]?step|delta[ _]?t(ime)?)"
-)
-"""What files call their frames a second, and the time from one to the next."""
-
-
-def says_time(name: str) -> bool:
-    """Whether a column's name says, in some language, that it is a time."""
-    spaced = re.sub("(?<=[a-z])(?=[A-Z])", "_", name)
-    return _SAYS_TIME.search(spaced) is not None
-
-
-def says_period(name: str) -> bool:
-    """Whether a name says that it is the time from one frame to the next: `dt`, `period_ms`."""
-    return _PERIOD.fullmatch(split_unit(name, SECONDS)[0].strip().lower()) is not None
-
-
-def is_periods(name: str, values: Stamps) -> bool:
-    """Whether a column holds the time since the row before, and not the time itself."""
-    steps = values[1:].astype(float)
-    return says_period(name) and len(steps) > 0 and bool(np.all(steps > 0)) and not rises(values)
-
-
-def rises(values: Stamps) -> bool:
-    """Whether a column rises steadily, as times and counters do and no joint does."""
-    steps = np.diff(values.astype(float))
-    return bool(len(steps) > 1 and np.all(steps > 0) and steps.max() < 10 * np.median(steps))
-
-
-def tells_time(name: str, values: Stamps) -> bool:
-    """Whether a column rises steadily, and its name, its unit or its numbers say it is a time."""
-    said = says_time(name) or split_unit(name, SECONDS)[1] is not None or _are_ticks(values)
-    return said and rises(values)
-
-
-def counts_down(name: str, values: Stamps) -> bool:
-    """Whether a column called a time falls steadily: `time_to_release`."""
-    return says_time(name) and rises(-values.astype(float))
-
-
-def _are_ticks(values: Stamps) -> bool:
-    """Whether they are ticks by their size, and as nanoseconds since 2000 no recording."""
-    if values.size < 2 or values.min() < _TICKS[0] or values.max() > _TICKS[1]:
-        return False
-    length = 1e-9 * float(values.max() - values.min())
-    return length < _SHORTEST or values.size / length > _FASTEST
-
-
-def skips_frames(values: Stamps) -> bool:
-    """Whether a column counts frames, of which some are missing: 7, 8, 9, 21, 22."""
-    steps = np.diff(values.astype(float))
-    if len(steps) < 2 or steps.min() <= 0 or np.any(values % 1):
-        return False
-    return bool(np.median(steps) == steps.min() < steps.max())
+"""What files call their frames a second."""
 
 
 def declared_rate(
@@ -137,10 +78,11 @@ def declared_rate(
     found: dict[str, float] = {}
     for name, value in sorted(said.items(), key=lambda item: "." in item[0]):
         place, _, called = name.rpartition(".")
-        bare, unit = split_unit(called, SECONDS)
-        is_period = _PERIOD.fullmatch(bare.lower()) is not None
+        is_period, unit = says_period(called), split_unit(called, SECONDS)[1]
         if OTHER_NAMES.search(place) or not (is_period or _RATE.fullmatch(called.lower())):
             continue
+        if np.size(value) > 1 and is_periods(called, np.asarray(value)):
+            continue  # of each frame, and so no rate
         if np.size(value) != 1 or np.asarray(value).dtype.kind not in "fiu":
             raise FileFormatError(
                 f"{where}: {name} is no number; expected times t, or dt, or rate: mend it, or "
@@ -244,7 +186,7 @@ def clock_of(
             "one time a frame"
         )
     known = unit or split_unit(name, SECONDS)[1]
-    if known is None and time_unit is None and _are_ticks(numbers):
+    if known is None and time_unit is None and are_ticks(numbers):
         numbers, known = (numbers - numbers[0]) * 100, "ns"
     unknown = None if known or time_unit else _IN_BRACKETS.search(name)
     if unknown is not None and not _QUALIFIES.fullmatch(unknown[1]):
@@ -317,43 +259,55 @@ def clock_among(
     """Return times from the arrays of an episode that say they are, held against each other.
 
     `said` are further numbers of the file, a rate perhaps among them. An array that is asked for by
-    name counts more. Where no name says so, the only array that rises steadily may be the time,
-    unless it is part of the `motion` or counts frames: it is asked about; where a rate is known, it
-    has to agree with it if it runs nearly as fast.
+    name counts more. Arrays of a file may be anything: where no name says so, one that is no part
+    of the `motion` may be the time if it is the only one that rises steadily and counts no frames,
+    and beside a known rate if it runs nearly as fast.
     """
     asked = options.time_column
-    fit = [name for name, array in arrays.items() if array.shape == (count,)]
-    times = [n for n in arrays if split_unit(n, SECONDS)[0] in _CALLED]
-    times += [n for n in fit if n not in times and tells_time(n, arrays[n])]
-    times = times or [n for n in fit if counts_down(n, arrays[n])]
-    if asked is not None and asked not in (*arrays, NO_COLUMN):
+    if asked not in (None, NO_COLUMN, *arrays):
         raise FileFormatError(f"{where} has no array {asked}; it holds {sorted(arrays)}: name one")
-    timed = asked is not None and bool(times)
+    every = dict(enumerate(arrays.items()))
+    called = [i for i, (name, _) in every.items() if split_unit(name, SECONDS)[0] in _CALLED]
+    fit = {i: own for i, own in every.items() if own[1].shape == (count,) and own[0] not in motion}
+    found = find_times(where, fit | {i: every[i] for i in called}, called)
+    timed = asked is not None and found.columns
     own = {} if timed else declared_rate(where, said or {}, options.rate)
-    times = times if asked is None else [n for n in arrays if n == asked]
-    others = [] if asked else [n for n in fit if skips_frames(arrays[n])]
-    rated, guessed = bool(own or options.rate is not None), list[Ambiguity]()
-    if not times and others and rated:
-        own |= {"stamps": arrays[others[0]], "name": others[0], "unit": FRAME}
-    elif not times and not asked and count >= FEWEST_COUNTS:
-        free = (n for n in fit if n not in motion and not COUNTER.search(n.lower()))
-        times = [n for n in free if rises(arrays[n]) and np.any(np.diff(arrays[n]) != 1)]
-        if rated:
-            rate = options.rate or own["own_rate"]
-            times = [n for n in times if _runs_at(rate, arrays[n])]
-        elif len(times) == 1:
-            what = f"{where} names no times, and {times[0]} looks like the time"
-            option = f"--time-column {shlex.quote(times[0])}"
-            guessed.append(Ambiguity(what, option, guessed=False))
-        times = times if len(times) == 1 else []
-    if not times:
+    if asked is not None:
+        found = FoundTimes(tuple(i for i, (name, _) in every.items() if name == asked))
+    elif not found.columns:
+        rate = options.rate or own.get("own_rate")
+        others = [
+            i
+            for i, (name, array) in fit.items()
+            if not COUNTER.search(name.lower()) and rises(array) and not counts_all(array)
+            if rate is None or _runs_at(rate, array)
+        ]
+        others = others if len(others) == 1 else []
+        found = other_times(where, fit, others, rated=rate is not None)
+    if not found.columns:
         return options.clock(episode, count, **own)
-    first, *others = dict.fromkeys([*times, *others])
-    clock = options.clock(episode, count, stamps=arrays[first], name=first, **own)
+    return clock_at(f"{where}: {episode}", episode, count, found, every, options, **own)
+
+
+def clock_at(
+    where: str,
+    episode: str,
+    count: int,
+    found: FoundTimes,
+    columns: Columns,
+    options: ReadOptions,
+    **of_file: Any,
+) -> Clock:
+    """Return the times of the found column, held against others; `of_file` is as in `clock_of`."""
+    name, stamps = columns[found.columns[0]]
+    if found.summed:
+        stamps = np.concatenate([[0.0], np.cumsum(stamps[1:])])
+    of_file["unit"] = found.unit or of_file.get("unit")
+    clock = options.clock(episode, count, stamps=stamps, name=name, **of_file)
+    held = {columns[i][0]: columns[i][1] for i in found.held if columns[i][1].shape == (count,)}
     if count > 1:
-        held = {name: arrays[name].astype(float) for name in others if name in fit}
-        hold_together(f"{where}: {episode}", {first: clock.times} | held)
-    return replace(clock, ambiguities=(*clock.ambiguities, *guessed))
+        hold_together(where, {name: clock.times, **held})
+    return replace(clock, ambiguities=(*found.guessed, *clock.ambiguities))
 
 
 def _runs_at(rate: float, stamps: Stamps) -> bool:
@@ -372,6 +326,7 @@ def hold_together(where: str, clocks: Mapping[str, Times]) -> None:
     (name, used), *others = clocks.items()
     period = float(np.median(np.diff(used)))
     for other, stamps in others:
+        stamps = stamps.astype(float)
         steps = np.diff(stamps)
         own = float(np.median(steps))
         scales = [scale for scale in SECONDS.values() if period > 0 and _same(own * scale, period)]
@@ -395,11 +350,11 @@ def hold_together(where: str, clocks: Mapping[str, Times]) -> None:
 
 def _doubt_rate(name: str, rate: float, count: int) -> tuple[Ambiguity, ...]:
     """Doubt a declared rate at which no arm is recorded: `dt` 20 is in milliseconds, or a rate."""
-    if _SLOWEST <= rate <= _FASTEST:
+    if SLOWEST <= rate <= FASTEST:
         return ()
     in_units = [rate / scale for unit, scale in SECONDS.items() if unit not in ("min", "h")]
     others = [1 / rate, *in_units] if _RATE.fullmatch(name.lower()) else [*in_units, 1 / rate]
-    likely = [other for other in others if _SLOWEST <= other <= _FASTEST] or [rate]
+    likely = [other for other in others if SLOWEST <= other <= FASTEST] or [rate]
     what = f"{name} in the file says {rate:.4g} frames a second, {count / rate:.4g} s in all"
     what += ": it looks like " + " or ".join(f"{other:.4g}" for other in likely)
     return (Ambiguity(what, f"--rate {likely[0]:.6g}"),)
@@ -422,8 +377,8 @@ def _judge(
     looks = judge_unit(unit, period, period=True)
     if looks == unit or period <= 0:
         return unit, ()
-    is_throw = looks is not None and _SHORTEST <= length * SECONDS[looks] <= LONGEST
-    plausible = _SLOWEST <= 1 / (period * SECONDS[unit]) <= _FASTEST
+    is_throw = looks is not None and SHORTEST <= length * SECONDS[looks] <= LONGEST
+    plausible = SLOWEST <= 1 / (period * SECONDS[unit]) <= FASTEST
     if said is not None and (plausible or not is_throw):
         return said, ()  # believed, unless another unit makes it the length of a throw
     as_said = f", as {by}," if said is not None else ""
@@ -439,7 +394,7 @@ def _judge(
         return "s", (Ambiguity(what, "--time-unit frame --rate HZ", guessed=False),)
     if said is None and period == 1:
         what += " (or it counts frames: --time-unit frame --rate HZ)"
-    elif said is None and "tick" in name.lower() and _SLOWEST <= 1e7 / period <= _FASTEST:
+    elif said is None and "tick" in name.lower() and SLOWEST <= 1e7 / period <= FASTEST:
         what = f"{name} steps by {period:g}, and nothing says how long a tick is"
         what += " (.NET's are 100 ns: then write that column in ns, times 100)"
         return "s", (Ambiguity(what, "--time-unit UNIT", guessed=False),)

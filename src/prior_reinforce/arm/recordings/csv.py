@@ -18,7 +18,7 @@ import numpy as np
 
 from prior_reinforce.arm.recordings.beside import columns_beside, twin_vectors
 from prior_reinforce.arm.recordings.channels import Kind, kinds
-from prior_reinforce.arm.recordings.clock import FEWEST_COUNTS, NO_COLUMN, Times
+from prior_reinforce.arm.recordings.clock import NO_COLUMN
 from prior_reinforce.arm.recordings.heads import with_heads
 from prior_reinforce.arm.recordings.naming import find_channels, numbered_like, vectors, words
 from prior_reinforce.arm.recordings.options import ReadOptions
@@ -44,6 +44,7 @@ from prior_reinforce.arm.recordings.table_times import (
     with_whole_dates,
 )
 from prior_reinforce.arm.recordings.tables import PLAIN, Table, is_unnamed, read_table
+from prior_reinforce.arm.recordings.time_finder import FEWEST_COUNTS, Times
 from prior_reinforce.arm.recordings.units import Ambiguity, say_names
 from prior_reinforce.errors import FileFormatError
 

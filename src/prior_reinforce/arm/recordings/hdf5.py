@@ -18,7 +18,6 @@ import numpy as np
 
 from prior_reinforce.arm.recordings.beside import may_move
 from prior_reinforce.arm.recordings.bounds import MOST_COLUMNS, check_numbers
-from prior_reinforce.arm.recordings.clock import Stamps
 from prior_reinforce.arm.recordings.naming import find_channels, said_in
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
@@ -29,6 +28,7 @@ from prior_reinforce.arm.recordings.recording import (
     natural_order,
 )
 from prior_reinforce.arm.recordings.stated import recorded_among
+from prior_reinforce.arm.recordings.time_finder import Stamps
 from prior_reinforce.errors import FileFormatError
 
 SUFFIXES = (".h5", ".hdf5")

@@ -13,10 +13,10 @@ import numpy as np
 from jaxtyping import Float
 from msgspec import Meta
 
-from prior_reinforce.arm.recordings.clock import LONGEST
 from prior_reinforce.arm.recordings.failed_reads import failed_reads, held_frames, stalls
 from prior_reinforce.arm.recordings.leaps import refuse_leaps
 from prior_reinforce.arm.recordings.recording import Recording
+from prior_reinforce.arm.recordings.time_finder import LONGEST
 from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.arrays import Frames, Plans, Point
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError

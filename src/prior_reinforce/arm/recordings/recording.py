@@ -16,7 +16,8 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.arm.recordings.bounds import check_names
-from prior_reinforce.arm.recordings.clock import Clock, Times
+from prior_reinforce.arm.recordings.clock import Clock
+from prior_reinforce.arm.recordings.time_finder import Times
 from prior_reinforce.arm.recordings.units import (
     CHANNEL_UNITS,
     Ambiguity,

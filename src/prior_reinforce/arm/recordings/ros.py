@@ -20,7 +20,6 @@ import numpy as np
 
 from prior_reinforce.arm.recordings.beside import columns_beside, is_of_base, may_move
 from prior_reinforce.arm.recordings.bounds import check_names, check_numbers
-from prior_reinforce.arm.recordings.clock import Times
 from prior_reinforce.arm.recordings.naming import find_channels
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
@@ -35,6 +34,7 @@ from prior_reinforce.arm.recordings.recording import (
     recorded,
     unread,
 )
+from prior_reinforce.arm.recordings.time_finder import Times
 from prior_reinforce.arm.recordings.trajectories import read_trajectory
 from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.arm.robots.limits import says_no_position

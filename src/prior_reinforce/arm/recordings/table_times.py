@@ -3,41 +3,36 @@
 from __future__ import annotations
 
 import re
-import shlex
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from itertools import combinations, islice, product
+from itertools import islice, product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import is_clock
 from prior_reinforce.arm.recordings.clock import (
-    FEWEST_COUNTS,
-    FRAME,
     NO_COLUMN,
     SAME_RATE,
     Clock,
-    Times,
-    counts_down,
+    clock_at,
     declared_rate,
-    hold_together,
-    is_periods,
-    rises,
-    says_time,
-    skips_frames,
-    tells_time,
 )
 from prior_reinforce.arm.recordings.options import ReadOptions
-from prior_reinforce.arm.recordings.tables import Table, is_unnamed
-from prior_reinforce.arm.recordings.units import (
-    SECONDS,
-    Ambiguity,
-    known_unit,
-    say_names,
-    split_unit,
+from prior_reinforce.arm.recordings.tables import Column, Table, is_unnamed
+from prior_reinforce.arm.recordings.time_finder import (
+    FEWEST_COUNTS,
+    FRAME,
+    FoundTimes,
+    Times,
+    find_times,
+    is_clock,
+    is_periods,
+    other_times,
+    rises,
+    says_time,
 )
+from prior_reinforce.arm.recordings.units import SECONDS, known_unit, say_names, split_unit
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 
 _TIMES = (
@@ -52,6 +47,9 @@ _SAYS = re.compile(
 )
 """`fps: 40`, `sample rate = 1 kHz`."""
 _SECONDS = re.compile(r"(?P<stem>.*?)(secs?|seconds|s)")
+
+_THOUSAND = re.compile(r"\d{1,3}([.,]\d{3})+")
+"""`1.000` beside a decimal comma."""
 
 
 def said_above(path: Path) -> dict[str, float]:
@@ -121,90 +119,32 @@ def named_column(table: Table, name: str, option: str) -> int:
     )
 
 
-_THOUSAND = re.compile(r"\d{1,3}([.,]\d{3})+")
-"""`1.000` beside a decimal comma."""
-
-
-class TimeColumns(NamedTuple):
-    """Which columns are the time."""
-
-    columns: tuple[int, ...] = ()
-    """None, one, or whole seconds and a part of a second."""
-    guessed: tuple[Ambiguity, ...] = ()
-    held: tuple[int, ...] = ()
-    """Columns that must agree with it."""
-    unit: str | None = None
-    """Unit of the last column, where it is known by other columns or by its numbers."""
-    summed: bool = False
-    """Whether the column holds the time since the row before."""
-
-
 def time_columns(
     table: Table, options: ReadOptions, above: dict[str, float], others: Sequence[int | None]
-) -> TimeColumns:
+) -> FoundTimes:
     """The columns of times; whatever rises steadily, and is no joint, may be one."""
     called = called_times(table, options)
     if options.time_column is not None:
         summed = any(is_periods(table.names[i], table.values[:, i]) for i in called)
-        return TimeColumns(tuple(called), summed=summed)
+        return FoundTimes(tuple(called), summed=summed)
     if (pair := _seconds_and_parts(table)) is not None:
         return pair
-    free = [i for i in range(len(table.names)) if i not in others]
-    rising = [i for i in free if rises(table.stamps(i))]
-    skipping = [i for i in free if skips_frames(table.values[:, i])]
-    called = [i for i in called if i in free]
-    called += [i for i in free if tells_time(table.names[i], table.stamps(i))]
-    called += [i for i in free if i not in called and _are_dates(table, i)]
-    called = called or [i for i in free if counts_down(table.names[i], table.stamps(i))]
-    _refuse_several(table, called)
-    if called:
-        held = [i for i in free if says_time(table.names[i])]
-        held = [i for i in held if np.all(np.diff(table.values[:, i]) > 0)]
-        return TimeColumns((called[0],), (), tuple({*held, *skipping} - {called[0]}))
-    for i in free:
-        if table.named and is_periods(table.names[i], table.values[:, i]):
-            return TimeColumns((i,), summed=True)
-    nameless = [i for i in rising if is_unnamed(table.names[i])]
-    if nameless and table.nanoseconds(nameless[0]) is not None:
-        return TimeColumns((nameless[0],))
-    if options.rate is not None or _declared(table, above, options):
-        # Whatever else rises is held against the rate; what counts rows says nothing of it.
-        long = len(table) >= FEWEST_COUNTS
-        rising = [i for i in rising if long and np.any(np.diff(table.stamps(i)) != 1)]
-        return TimeColumns((*skipping, *rising)[:1], unit=FRAME if skipping else None)
-    if rising and len(table.names) > 1:
-        first = rising[0]
-        shown = (table.names[first] or f"{first + 1}").removeprefix("column ")
-        column = f"column {shown}" if shown.isdigit() else shown
-        what = f"{table.where} names no column of times, and {column} looks like the time"
-        return TimeColumns((first,), (Ambiguity(what, f"--time-column {shlex.quote(shown)}"),))
-    return TimeColumns()
+    free = _columns(table, [i for i in range(len(table.names)) if i not in others])
+    dated = [i for i in free if is_unnamed(table.names[i]) and table.nanoseconds(i) is not None]
+    called = [i for i in (*called, *(i for i in dated if rises(free[i][1]))) if i in free]
+    found = find_times(table.where, free, called)
+    if found.columns:
+        return found
+    rated = options.rate is not None or bool(_declared(table, above, options))
+    return other_times(table.where, free, free if len(table.names) > 1 else (), rated=rated)
 
 
-def _are_dates(table: Table, column: int) -> bool:
-    """Whether a column called a time holds dates that rise, though unevenly: a log of changes."""
-    dates = table.nanoseconds(column) if says_time(table.names[column]) else None
-    return dates is not None and bool(np.all(np.diff(dates) > 0))
+def _columns(table: Table, chosen: Iterable[int]) -> dict[int, tuple[str, Column]]:
+    """Some columns, by name, as times."""
+    return {i: (table.names[i] or f"column {i + 1}", table.stamps(i)) for i in chosen}
 
 
-def _refuse_several(table: Table, times: Sequence[int]) -> None:
-    """FileFormatError if columns of one name are times that differ: of each channel its own.
-
-    pandas numbers columns that come again, `Time.1`. Half a frame is no difference.
-    """
-    bare = [re.sub(r"\.\d+$", "", name) for name in table.names]
-    for i, j in combinations(times, 2):
-        one, other = table.stamps(i), table.stamps(j)
-        apart = np.abs(one - other).max() > np.median(np.abs(np.diff(one))) / 2
-        if bare[i] == bare[j] and apart:
-            raise FileFormatError(
-                f"{table.where} has two columns {bare[i]} that differ, {one[0]:g} and "
-                f"{other[0]:g} first: each channel has its own times; write all at the times of "
-                "one: numpy.interp(its times, their own times, their values)"
-            )
-
-
-def _seconds_and_parts(table: Table) -> TimeColumns | None:
+def _seconds_and_parts(table: Table) -> FoundTimes | None:
     """Two columns that are one time: `stamp.sec` and `stamp.nanosec`, or `tv_sec` and `tv_usec`."""
     ends = {name.lower(): i for i, name in enumerate(table.names) if table.named}
     for name, i in ends.items():
@@ -215,7 +155,7 @@ def _seconds_and_parts(table: Table) -> TimeColumns | None:
             if ending.startswith(match["stem"]) and SECONDS.get(unit, 1.0) < 1:
                 whole, part = table.values[:, i], table.values[:, j] * SECONDS[unit]
                 if np.all(whole % 1 == 0) and np.all((part >= 0) & (part < 1)):
-                    return TimeColumns((i, j), unit=unit)
+                    return FoundTimes((i, j), unit=unit)
     return None
 
 
@@ -230,7 +170,7 @@ def counts_rows(table: Table, column: int, times: Times) -> bool:
 def clock_of_table(
     table: Table,
     episode: str,
-    times: TimeColumns,
+    times: FoundTimes,
     options: ReadOptions,
     above: dict[str, float],
     unit: str | None,
@@ -245,25 +185,22 @@ def clock_of_table(
             _check_times(table, [i for i, n in enumerate(table.names) if says_time(n)])
         return options.clock(episode, len(table), **declared)
     time = times.columns[0]
-    dates, name = table.nanoseconds(time), table.names[time] or f"column {time + 1}"
-    unit = times.unit or unit
-    if dates is None:
+    columns = _columns(table, range(len(table.names)))
+    if table.nanoseconds(time) is not None:
+        unit = "ns"
+    else:
         _check_times(table, [time])
-    stamps, unit = (dates, "ns") if dates is not None else (table.numbers(time), unit)
-    if unit and len(times.columns) == 2:
-        whole, part = (table.values[:, i] for i in times.columns)
-        stamps = (whole - whole[0]) / SECONDS[unit] + part
-        name = f"{name} and {table.names[times.columns[1]]}"
-    if times.summed:
-        stamps = np.concatenate([[0.0], np.cumsum(stamps[1:])])
-    unit = unit or table.units[time]
+        columns[time] = (columns[time][0], table.numbers(time))
+        unit = times.unit or unit or table.units[time]
+    if times.unit and len(times.columns) == 2:
+        (name, whole), (part_name, part) = (columns[i] for i in times.columns)
+        stamps = (whole - whole[0]) / SECONDS[times.unit] + part
+        columns[time] = (f"{name} and {part_name}", stamps)
     # Where there are times, a comment may be of another rate, as that of control.
     frames = FRAME in (unit, options.time_unit)
     declared = _declared(table, above, options) if frames else {}
-    clock = options.clock(episode, len(table), stamps=stamps, name=name, unit=unit, **declared)
-    held = {table.names[i]: table.values[:, i] for i in times.held if table.is_number(i)}
-    hold_together(table.where, {name: clock.times, **held})
-    return clock
+    times = times._replace(held=tuple(i for i in times.held if table.is_number(i)), unit=unit)
+    return clock_at(table.where, episode, len(table), times, columns, options, **declared)
 
 
 def _check_times(table: Table, columns: Sequence[int]) -> None:

@@ -20,11 +20,11 @@ import numpy as np
 
 from prior_reinforce.arm.recordings.beside import may_move
 from prior_reinforce.arm.recordings.bounds import check_bytes, check_chunks, check_numbers
-from prior_reinforce.arm.recordings.clock import Stamps
 from prior_reinforce.arm.recordings.naming import said_in
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import Episodes, Recording, named_damage
 from prior_reinforce.arm.recordings.stated import recorded_among
+from prior_reinforce.arm.recordings.time_finder import Stamps
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import require_inside
 

@@ -1,0 +1,196 @@
+"""Which columns of a table, or arrays of a file, are the times of its frames."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Collection, Mapping, Sequence
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float, Shaped
+
+from prior_reinforce.arm.recordings.units import SECONDS, Ambiguity, split_unit
+from prior_reinforce.errors import FileFormatError
+
+Times = Float[np.ndarray, " T"]
+"""Times of T frames, in [s]."""
+Stamps = Shaped[np.ndarray, "..."]
+"""Times of T frames as a file holds them: in its unit, of any shape and kind."""
+Columns = Mapping[int, tuple[str, Stamps]]
+"""Name and numbers of columns or arrays, by their place."""
+FRAME = "frame"
+"""The unit of a column that counts frames; the rate says how long one is."""
+FEWEST_COUNTS = 20
+"""Frames of which it can be said that something counts them. Ours."""
+COUNTER = re.compile(
+    r"(^|[^a-z])(seq|frame|sample|index|idx|count|counter|tick|row|nr|step)s?($|[^a-z])"
+)
+"""Names of columns that count frames."""
+SHORTEST, LONGEST = 0.1, 60.0
+"""Seconds that a throw, slide or swing is recorded for. Ours, and wide on purpose."""
+SLOWEST, FASTEST = 1.0, 1e4
+"""Frames a second beyond which a rate or a unit is doubted although somebody says it. Ours."""
+_SAYS_TIME = re.compile(
+    r"(^|[^a-z])(t|ts|times?|timestamps?|stamp|epoch|clock|elapsed|duration|date|secs?|seconds?)"
+    r"($|[^a-z])"
+    r"|[a-z]_?(time|stamp)(_?m?s|_?sec)?$|zeit|temps|tiempo|tempo|czas|sekund|secondes|segundos|врем"
+    r"|时间|時間|時刻|时刻|시간",
+    re.IGNORECASE,
+)
+_PERIOD = re.compile(
+    r"((control|sampl[a-z]*|frame)[ _]?)?(dt|period|time[ _]?step|delta[ _]?t(ime)?)"
+)
+"""What files call the time from one frame to the next."""
+_TICKS = (6.3e17, 6.6e17)
+"""Numbers that are .NET's ticks of 100 ns since the year 1, from 1997 to 2092."""
+_SAME_CLOCK = 0.01
+"""Share by which two clocks of a recording differ at most. Ours."""
+
+
+class FoundTimes(NamedTuple):
+    """Which columns are the times."""
+
+    columns: tuple[int, ...] = ()
+    """None, one, or whole seconds and a part of a second."""
+    held: tuple[int, ...] = ()
+    """Columns that must agree with it."""
+    unit: str | None = None
+    """Unit of the last column, where it is known by other columns or by its numbers."""
+    summed: bool = False
+    """Whether the column holds the time since the frame before."""
+    guessed: tuple[Ambiguity, ...] = ()
+
+
+def find_times(where: object, columns: Columns, called: Collection[int]) -> FoundTimes:
+    """Return the times among columns, none of which is a joint, by what their names say.
+
+    The first counts of those that are `called` so for certain, or rise steadily and say in some
+    language that they are a time; else of those that say so and rise or fall at all; else periods,
+    which are summed. FileFormatError if columns of one name are times that differ.
+    """
+    times = [*called, *(i for i, each in columns.items() if tells_time(*each))]
+    upwards = [i for i, (name, own) in columns.items() if says_time(name) and _increases(own)]
+    times = times or upwards or [i for i, each in columns.items() if counts_down(*each)]
+    if not times:
+        periods = tuple(i for i, each in columns.items() if is_periods(*each))
+        return FoundTimes(periods[:1], summed=bool(periods))
+    _refuse_several(where, columns, sorted({*times}))
+    skipping = [i for i, (_, own) in columns.items() if skips_frames(own)]
+    first, *held = dict.fromkeys([*times, *upwards, *skipping])
+    return FoundTimes((first,), tuple(held))
+
+
+def other_times(
+    where: object, columns: Columns, others: Collection[int], *, rated: bool
+) -> FoundTimes:
+    """Return what may be the times where no name says so: what rises steadily of the `others`.
+
+    If a rate is known (`rated`), that, or a count that skips frames, is held against it; else the
+    first of them is asked about.
+    """
+    rising = [i for i in others if rises(columns[i][1])]
+    if rated:  # what counts frames one by one says nothing of it
+        skipping = [i for i, (_, own) in columns.items() if skips_frames(own)]
+        rising = [i for i in rising if not counts_all(columns[i][1])]
+        return FoundTimes((*skipping, *rising)[:1], unit=FRAME if skipping else None)
+    if not rising:
+        return FoundTimes()
+    name = (columns[rising[0]][0] or f"{rising[0] + 1}").removeprefix("column ")
+    column = f"column {name}" if name.isdigit() else name
+    what = f"{where} names no times, and {column} looks like the time"
+    option = f"--time-column {shlex.quote(name)}"
+    return FoundTimes((rising[0],), guessed=(Ambiguity(what, option, guessed=False),))
+
+
+def _refuse_several(where: object, columns: Columns, times: Sequence[int]) -> None:
+    """Refuse times of one name that differ: of each channel its own.
+
+    pandas numbers columns that come again, `Time.1`. Half a frame is no difference.
+    """
+    for (name, one), (again, other) in combinations((columns[i] for i in times), 2):
+        bare, same = (re.sub(r"\.\d+$", "", each) for each in (name, again))
+        if bare != same or one.shape != other.shape:
+            continue
+        if np.abs(one - other).max() > np.median(np.abs(np.diff(one))) / 2:
+            raise FileFormatError(
+                f"{where} has two columns {bare} that differ, {one[0]:g} and {other[0]:g} first: "
+                "each channel has its own times; write all at the times of one: numpy.interp(its "
+                "times, their own times, their values)"
+            )
+
+
+def says_time(name: str) -> bool:
+    """Whether a column's name says, in some language, that it is a time."""
+    spaced = re.sub("(?<=[a-z])(?=[A-Z])", "_", name)
+    return _SAYS_TIME.search(spaced) is not None
+
+
+def says_period(name: str) -> bool:
+    """Whether a name says that it is the time from one frame to the next: `dt`, `period_ms`."""
+    return _PERIOD.fullmatch(split_unit(name, SECONDS)[0].strip().lower()) is not None
+
+
+def is_periods(name: str, values: Stamps) -> bool:
+    """Whether a column holds the time since the frame before, and not the time itself."""
+    steps = values[1:].astype(float)
+    return says_period(name) and len(steps) > 0 and bool(np.all(steps > 0)) and not rises(values)
+
+
+def rises(values: Stamps) -> bool:
+    """Whether a column rises steadily, as times and counters do and no joint does."""
+    steps = np.diff(values.astype(float))
+    return bool(len(steps) > 1 and np.all(steps > 0) and steps.max() < 10 * np.median(steps))
+
+
+def _increases(values: Stamps) -> bool:
+    """Whether a column rises, steadily or not: a log of changes."""
+    return bool(len(values) > 1 and np.all(np.diff(values.astype(float)) > 0))
+
+
+def tells_time(name: str, values: Stamps) -> bool:
+    """Whether a column rises steadily, and its name, its unit or its numbers say it is a time."""
+    said = says_time(name) or split_unit(name, SECONDS)[1] is not None or are_ticks(values)
+    return said and rises(values)
+
+
+def counts_down(name: str, values: Stamps) -> bool:
+    """Whether a column called a time falls steadily: `time_to_release`."""
+    return says_time(name) and rises(-values.astype(float))
+
+
+def counts_all(values: Stamps) -> bool:
+    """Whether a column may count frames one by one, or is too short to tell."""
+    return len(values) < FEWEST_COUNTS or bool(np.all(np.diff(values) == 1))
+
+
+def skips_frames(values: Stamps) -> bool:
+    """Whether a column counts frames, of which some are missing: 7, 8, 9, 21, 22."""
+    steps = np.diff(values.astype(float))
+    if len(steps) < 2 or steps.min() <= 0 or np.any(values % 1):
+        return False
+    return bool(np.median(steps) == steps.min() < steps.max())
+
+
+def are_ticks(values: Stamps) -> bool:
+    """Whether they are ticks by their size, and as nanoseconds since 2000 no recording."""
+    if values.size < 2 or values.min() < _TICKS[0] or values.max() > _TICKS[1]:
+        return False
+    length = 1e-9 * float(values.max() - values.min())
+    return length < SHORTEST or values.size / length > FASTEST
+
+
+def is_clock(name: str, values: Times, times: Times) -> bool:
+    """Whether a column tells the time or counts frames: by its name, or by how fast it rises."""
+    steps = np.diff(values)
+    seconds = times[-1] - times[0]
+    if len(steps) < 2 or not np.all(steps > 0) or seconds <= 0:
+        return False
+    whole = bool(np.all(values % 1 == 0))
+    if says_time(name) or (whole and (np.median(steps) == 1 or COUNTER.search(name.lower()))):
+        return True
+    rates = [(values[-1] - values[0]) * scale / seconds for scale in SECONDS.values()]
+    line = values[0] + (values[-1] - values[0]) * (times - times[0]) / seconds
+    near = np.abs(values - line).max() <= 3 * np.median(steps)
+    return bool(near and any(abs(rate - 1) < _SAME_CLOCK for rate in rates))
