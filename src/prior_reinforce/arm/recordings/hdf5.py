@@ -18,7 +18,7 @@ import numpy as np
 
 from prior_reinforce.arm.recordings.beside import may_move
 from prior_reinforce.arm.recordings.bounds import MOST_COLUMNS, check_numbers
-from prior_reinforce.arm.recordings.naming import find_channels, said_in
+from prior_reinforce.arm.recordings.naming import said_in
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     Episodes,
@@ -27,7 +27,7 @@ from prior_reinforce.arm.recordings.recording import (
     named_damage,
     natural_order,
 )
-from prior_reinforce.arm.recordings.stated import recorded_among
+from prior_reinforce.arm.recordings.stated import motion_keys, recorded_among
 from prior_reinforce.arm.recordings.time_finder import Stamps
 from prior_reinforce.errors import FileFormatError
 
@@ -64,17 +64,19 @@ def read(source: Path, options: ReadOptions) -> Episodes:
 def _demo(path: Path, top: Any, within: str, options: ReadOptions, episode: str) -> Recording:
     with named_damage(path, "HDF5"):
         group = _own(path, top, within)
-        keys = options.key or tuple(k for k in _KEYS if _own(path, group, k) is not None)[:1]
-        single = [name for name, shape in _shapes(group).items() if len(shape) == 1]
-        keys = keys or tuple(single[i] for i in find_channels(options.joints or (), single) or ())
-        keys = keys or _KEYS[:1]
+        shapes = _shapes(group)
+        for name in options.key or _KEYS:  # a link within the file, too
+            found = _own(path, group, name)
+            if found is not None and name not in shapes and _is_numbers(found):
+                shapes[name] = found.shape
+        keys = motion_keys(f"{path}: {group.name}", options, shapes, _KEYS)
         key = keys[0]
-        arrays = {name: _motion(path, group, name) for name in keys}
+        arrays = {name: _numbers(path, name, _own(path, group, name)) for name in keys}
         count = len(arrays[key])
         # Whatever may move, at any rate, or tells the time of the frames, or marks what is padding.
         there = {
             name: _numbers(path, name, _own(path, group, name))
-            for name, own in _shapes(group).items()
+            for name, own in shapes.items()
             if len(own) <= 2 and (own[0] == count or math.prod(own) <= _MOST_AT_OWN_RATE)
             if math.prod(own) == count or may_move(name, math.prod(own[1:]))
         } | arrays
@@ -137,30 +139,21 @@ def _is_own(found: Any) -> bool:
     return isinstance(found, h5py.Dataset) and not (found.external or found.is_virtual)
 
 
+def _is_numbers(found: Any) -> bool:
+    """Whether an item is an array of numbers of this very file."""
+    return _is_own(found) and bool(found.shape) and found.dtype.kind in "biuf"
+
+
 def _shapes(group: Any) -> dict[str, tuple[int, ...]]:
     """Shapes of the arrays of numbers in an episode, by their path in it."""
     found: dict[str, tuple[int, ...]] = {}
 
     def collect(name: str, item: Any) -> None:
-        if _is_own(item) and item.shape and item.dtype.kind in "biuf":
+        if _is_numbers(item):
             found[name] = item.shape
 
     group.visititems(collect)
     return found
-
-
-def _motion(path: Path, group: Any, key: str) -> np.ndarray:
-    """The motion under a key, or an error that lists the candidates."""
-    found = _own(path, group, key)
-    if len(getattr(found, "shape", ())) not in (1, 2):
-        candidates = sorted(name for name, shape in _shapes(group).items() if len(shape) == 2)
-        raise FileFormatError(
-            f"{path} has no array (T, D) at {key} in {group.name}; arrays of that shape are "
-            f"{candidates or 'none'}: say which with the key"
-        )
-    if found.dtype.kind not in "fiu":
-        raise FileFormatError(f"{path}: {key} holds {found.dtype}, expected numbers")
-    return np.asarray(_numbers(path, key, found), dtype=np.float64)
 
 
 def _numbers(path: Path, name: str, found: Any) -> Stamps:

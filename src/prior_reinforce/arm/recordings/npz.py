@@ -18,7 +18,7 @@ import numpy as np
 
 from prior_reinforce.arm.recordings.beside import Arrays
 from prior_reinforce.arm.recordings.bounds import MOST_BYTES, check_bytes
-from prior_reinforce.arm.recordings.naming import find_channels, said_in
+from prior_reinforce.arm.recordings.naming import said_in
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     EPISODE_COLUMNS,
@@ -29,7 +29,7 @@ from prior_reinforce.arm.recordings.recording import (
     natural_order,
     unread,
 )
-from prior_reinforce.arm.recordings.stated import recorded_among
+from prior_reinforce.arm.recordings.stated import motion_keys, recorded_among
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import open_npz
 
@@ -75,24 +75,9 @@ def _each(path: Path, arrays: Arrays, options: ReadOptions) -> Episodes:
 
 
 def _episodes(path: Path, arrays: Arrays, name: str, options: ReadOptions) -> Episodes:
-    keys = options.key or tuple(name for name in _MOTION_KEYS if name in arrays)[:1]
-    if not keys:
-        single = [name for name, array in arrays.items() if array.ndim == 1]
-        keys = tuple(single[i] for i in find_channels(options.joints or (), single) or ())
-    key = next((name for name in keys if name not in arrays), None)
-    if not keys or key is not None:
-        raise FileFormatError(
-            f"{path} has no array {key or ' or '.join(_MOTION_KEYS)}; it holds "
-            f"{sorted(arrays)}: say which with --key"
-        )
+    shapes = {name: own.shape for name, own in arrays.items() if own.dtype.kind in "biuf"}
+    keys = motion_keys(path, options, shapes, _MOTION_KEYS, most=3)
     motions = arrays[keys[0]]
-    for key in keys:
-        least = 1 if len(keys) > 1 else 2
-        if not least <= arrays[key].ndim <= 3 or arrays[key].dtype.kind not in "fiu":
-            raise FileFormatError(
-                f"{path}: {key} has shape {arrays[key].shape} and type {arrays[key].dtype}, "
-                "expected numbers of shape (T, D) or (N, T, D)"
-            )
     outcomes = next((arrays[name] for name in _OUTCOME_KEYS if name in arrays), None)
     episodes, several = [name], motions.ndim == 3
     if not several:

@@ -19,7 +19,13 @@ from prior_reinforce.arm.recordings.beside import MASK, Arrays, arrays_beside
 from prior_reinforce.arm.recordings.bounds import check_names
 from prior_reinforce.arm.recordings.channels import Kind, kinds, one_for_all
 from prior_reinforce.arm.recordings.clock import Clock, clock_among
-from prior_reinforce.arm.recordings.naming import OTHER_NAMES, Texts, missing_channels, said_in
+from prior_reinforce.arm.recordings.naming import (
+    OTHER_NAMES,
+    Texts,
+    find_channels,
+    missing_channels,
+    said_in,
+)
 from prior_reinforce.arm.recordings.recording import (
     Positions,
     Recording,
@@ -44,6 +50,32 @@ _UNIT = re.compile(r"((joint|angle|angular|position|motion|rotation)s?_?)?units?
 """What the joints' units are called among others, deep in what a file says of itself."""
 _MOST_SAID = 1_000_000
 """Bytes of a JSON beside a table at most. Ours: it says what the columns are."""
+
+
+def motion_keys(
+    where: object,
+    options: ReadOptions,
+    shapes: Mapping[str, tuple[int, ...]],
+    usual: Sequence[str],
+    *,
+    most: int = 2,
+) -> tuple[str, ...]:
+    """Return which arrays of numbers are the motion: as given, the first usual one, or a joint's.
+
+    `shapes` are theirs, and `most` dimensions the motion may have, (T, D) or (N, T, D).
+    FileFormatError lists those that may be it where one is missing or of another shape.
+    """
+    single = [name for name, shape in shapes.items() if len(shape) == 1]
+    keys = options.key or tuple(name for name in usual if name in shapes)[:1]
+    keys = keys or tuple(single[i] for i in find_channels(options.joints or (), single) or ())
+    for key in keys or [" or ".join(usual)]:
+        if not (1 if len(keys) > 1 else 2) <= len(shapes.get(key, ())) <= most:
+            there = sorted(name for name, shape in shapes.items() if 2 <= len(shape) <= most)
+            raise FileFormatError(
+                f"{where} has no array {key} (expected numbers of shape (T, D)"
+                f"{' or (N, T, D)' * (most > 2)}); it holds {there}: say which with --key"
+            )
+    return keys
 
 
 def recorded_among(

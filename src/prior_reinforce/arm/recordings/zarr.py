@@ -23,7 +23,7 @@ from prior_reinforce.arm.recordings.bounds import check_bytes, check_chunks, che
 from prior_reinforce.arm.recordings.naming import said_in
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import Episodes, Recording, named_damage
-from prior_reinforce.arm.recordings.stated import recorded_among
+from prior_reinforce.arm.recordings.stated import motion_keys, recorded_among
 from prior_reinforce.arm.recordings.time_finder import Stamps
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import require_inside
@@ -63,18 +63,12 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         group: Any = zarr.open_group(store, mode="r", **how)
         there = sorted(name.removeprefix("data/") for name in arrays if name.startswith("data/"))
         vectors = [name for name in there if len(arrays[f"data/{name}"][0]) == 2]
-        keys = options.key or (tuple(vectors) if len(vectors) == 1 else ())
-        wrong = next((name for name in keys if name not in there), None)
-        if not keys or wrong is not None or keys[0] not in vectors:
-            what = wrong or (keys[0] if keys else "that is the only one")
-            raise FileFormatError(
-                f"{source} has no array (T, D) {what} in data/; there are "
-                f"{vectors}: say which with the key"
-            )
+        shapes = {name: arrays[f"data/{name}"][0] for name in there}
+        usual = vectors if len(vectors) == 1 else ()
+        keys = motion_keys(source, options, shapes, usual)
         if _ENDS not in arrays:
             raise FileFormatError(f"{source} has no numbers at {_ENDS}; copy the store again")
         ends = np.asarray(_numbers(source, group, arrays, _ENDS), dtype=np.int64).ravel()
-        shapes = {name: arrays[f"data/{name}"][0] for name in there}
         count = shapes[keys[0]][0]
         most = _MOST_FASTER * math.prod(shapes[keys[0]])  # sound has more
         numbers = {
