@@ -357,7 +357,7 @@ def _read_points(path: Path) -> Float[np.ndarray, "n 4"]:
     from prior_reinforce.arm.recordings.units import conversion, split_unit
 
     table = read_table(path, head=_COLUMNS)
-    split = [split_unit(name.strip()) for name in table.names]
+    split = [split_unit(name.strip(), any_word=True) for name in table.names]
     names = [name.lower() for name, _ in split]
     if missing := {*_COLUMNS} - {*names}:
         raise FileFormatError(

@@ -16,7 +16,6 @@ from prior_reinforce.arm.recordings.units import (
     raise_if_ambiguous,
     say_names,
     split_unit,
-    stated_unit,
 )
 from prior_reinforce.errors import ConfigurationError, UnclearUnitsError
 from prior_reinforce.units import base_of
@@ -129,7 +128,7 @@ def test_what_no_arm_can_do_whoever_says_it(unit, reach, cannot):
 
 
 def test_a_motors_hundredths_of_a_degree_are_converted():
-    assert stated_unit("pan [0.01 deg]") == ("pan", "0.01 deg")
+    assert split_unit("pan [0.01 deg]", CHANNEL_UNITS, any_word=True) == ("pan", "0.01 deg")
     assert conversion("0.01 deg", "rad", "pan") == pytest.approx(math.pi / 18000)
 
 

@@ -195,7 +195,7 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
     if not path.is_file():
         raise FileFormatError(f"no table at {path}; give the path of a table {example}")
     table = read_table(path, head=ROW_COLUMNS)
-    split = [split_unit(name) for name in table.names]
+    split = [split_unit(name, any_word=True) for name in table.names]
     # `distance_in` is in inches where there is a `distance`; elsewhere `plug_in` is no length.
     wanted = {f"{name}_in": (name, "in") for name in names or ()}
     split = [wanted.get(name, (name, unit)) for name, unit in split]

@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,7 +22,6 @@ from prior_reinforce.arm.recordings.units import (
     Ambiguity,
     say_names,
     split_unit,
-    stated_unit,
 )
 from prior_reinforce.arrays import Point
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError, PriorReinforceError
@@ -233,8 +231,8 @@ def without_units(names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str | No
     A word in square brackets is a unit though it is not known, `pressure [bar]`, unless it is what
     tells names apart, as in `q[elbow]`.
     """
-    for split_one in (stated_unit, partial(split_unit, among=CHANNEL_UNITS)):
-        split = [split_one(name) for name in names]
+    for any_word in (True, False):
+        split = [split_unit(name, CHANNEL_UNITS, any_word=any_word) for name in names]
         bare = tuple(name for name, _ in split)
         if len(set(bare)) == len(set(names)):
             break

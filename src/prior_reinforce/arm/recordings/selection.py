@@ -136,7 +136,9 @@ def select(
     moving = moving_beside(picked)
     left_out = [f"{n}, {low:.4g} to {high:.4g}" for n, (low, high) in moving.items()]
     if unnamed and not guessed and recordings[0].named:
-        guessed = _doubt_first(picked[0].columns, [split_unit(name)[0] for name in moving])
+        guessed = _doubt_first(
+            picked[0].columns, [split_unit(name, any_word=True)[0] for name in moving]
+        )
     return Selection(
         tuple(replace(r, positions=r.positions * scale, units=wanted) for r in takes),
         names,

@@ -412,7 +412,7 @@ def _without_lists(where: str, columns: list[_Column]) -> list[_Column]:
                 f"{where}: column {name} holds lists of {min(map(len, rows))} to "
                 f"{max(map(len, rows))} numbers; write one column a joint"
             )
-        bare, own = split_unit(name)
+        bare, own = split_unit(name, any_word=True)
         parts += [
             (f"{bare}_{i}", unit or own, [*part]) for i, part in enumerate(zip(*rows, strict=True))
         ]

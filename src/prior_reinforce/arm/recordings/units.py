@@ -80,12 +80,14 @@ def known_unit(text: str) -> str | None:
     return unit if unit in _UNITS else None
 
 
-def split_unit(column: str, among: Collection[str] | None = None) -> tuple[str, str | None]:
+def split_unit(
+    column: str, among: Collection[str] = _UNITS, *, any_word: bool = False
+) -> tuple[str, str | None]:
     """Split a column's name `x_cm`, `q0 [deg]` or `time (ms)` into the name and the unit in it.
 
-    `among` are units that may stand there, in brackets also behind a number, `(0.001deg)`; None
-    takes all, and in square brackets any word at all: `volume [ml]`. Without such a unit, the whole
-    name and None.
+    `among` are units that may stand there, in brackets also behind a number, `(0.001deg)`; with
+    `any_word` so is any word in square brackets: `volume [ml]`. Without such a unit, the whole name
+    and None.
     """
     for pattern in (_BRACKETS, _ENDING, _BEFORE_NUMBER, _CAMEL):
         match = pattern.fullmatch(column.strip())
@@ -94,23 +96,13 @@ def split_unit(column: str, among: Collection[str] | None = None) -> tuple[str, 
             continue
         if pattern is _BEFORE_NUMBER:
             return match["name"] + match["number"], unit
-        if unit in (among or _UNITS):
+        if unit in among:
             return match["name"].strip(), unit
         of_number, number = without_number(match["unit"])
-        if pattern is _BRACKETS and number != 1 and of_number in (among or _UNITS):
+        if pattern is _BRACKETS and number != 1 and of_number in among:
             return match["name"].strip(), match["unit"]
-        if among is None and column.strip().endswith("]"):
-            return match["name"].strip(), match["unit"]
-    return column, None
-
-
-def stated_unit(channel: str) -> tuple[str, str | None]:
-    """Split a channel's name like `split_unit`; any word in square brackets counts as a unit."""
-    name, unit = split_unit(channel, CHANNEL_UNITS)
-    match = _UNKNOWN.fullmatch(channel.strip())
-    if unit is not None or match is None:
-        return name, unit
-    return match["name"], spelt(match["unit"]) or match["unit"]
+    match = _UNKNOWN.fullmatch(column.strip()) if any_word else None
+    return (match["name"], spelt(match["unit"]) or match["unit"]) if match else (column, None)
 
 
 def conversion(recorded: str, wanted: str, name: str) -> float:
