@@ -87,10 +87,20 @@ def test_times_of_one_name_that_differ_are_refused():
 
 def test_what_rises_is_asked_about_or_held_against_a_rate():
     columns = places(q=np.sin(T), n=np.arange(101.0), up=1.5 * T, frame=SKIPS)
-    (doubt,) = other_times("a", columns, (2,), rated=False).guessed
+    (doubt,) = other_times("a", places(q=np.sin(T), up=T), None, of_anything=False).guessed
     assert doubt.option == "--time-column up"
     assert not doubt.guessed
-    assert other_times("a", columns, (2,), rated=True).unit == FRAME
+    for anything in (True, False):
+        found = other_times("a", columns, 20.0, of_anything=anything)
+        assert (found.columns, found.unit) == ((3,), FRAME)
     del columns[3]
-    assert other_times("a", columns, (1, 2), rated=True).columns == (2,)
-    assert other_times("a", columns, (0, 1), rated=True).columns == ()
+    assert other_times("a", columns, 20.0, of_anything=False).columns == (2,)
+
+
+def test_of_arrays_of_anything_only_one_that_runs_as_the_rate_says_is_held_against_it():
+    columns = places(q=np.sin(T), up=1.5 * T)
+    assert other_times("a", columns, 20.0, of_anything=True).columns == ()
+    assert other_times("a", columns, 15.0, of_anything=True).columns == (1,)
+    assert other_times("a", columns, None, of_anything=True).columns == (1,)
+    assert other_times("a", places(up=T, down=2 * T), None, of_anything=True).columns == ()
+    assert other_times("a", places(frame=2 * T), None, of_anything=True).columns == ()

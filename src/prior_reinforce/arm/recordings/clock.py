@@ -24,7 +24,6 @@ from prior_reinforce.arm.recordings.time_finder import (
     Stamps,
     Times,
     are_ticks,
-    counts_all,
     find_times,
     is_periods,
     other_times,
@@ -54,8 +53,6 @@ _HERTZ = re.compile(r"(\d+(?:[.,]\d+)?)[ _-]?hz", re.I)
 """`throw_4_50Hz`."""
 SAME_RATE = 0.05
 """Rates that differ by a smaller share are one. Ours: clocks of recorders jitter and drift."""
-_NEARLY = 1.25
-"""Factor within which what rises must run as fast as a rate says, to be a clock. Ours."""
 _APART = 3.0
 """Frames by which two clocks of one recording may differ. Ours: jitter is a frame or two."""
 _LOWEST_RATE, _HIGHEST_RATE = 1e-3, 1e6
@@ -259,31 +256,22 @@ def clock_among(
     """Return times from the arrays of an episode that say they are, held against each other.
 
     `said` are further numbers of the file, a rate perhaps among them. An array that is asked for by
-    name counts more. Arrays of a file may be anything: where no name says so, one that is no part
-    of the `motion` may be the time if it is the only one that rises steadily and counts no frames,
-    and beside a known rate if it runs nearly as fast.
+    name counts more. Where none says so, one that is no part of the `motion` may be the time.
     """
     asked = options.time_column
     if asked not in (None, NO_COLUMN, *arrays):
         raise FileFormatError(f"{where} has no array {asked}; it holds {sorted(arrays)}: name one")
-    every = dict(enumerate(arrays.items()))
-    called = [i for i, (name, _) in every.items() if split_unit(name, SECONDS)[0] in _CALLED]
-    fit = {i: own for i, own in every.items() if own[1].shape == (count,) and own[0] not in motion}
-    found = find_times(where, fit | {i: every[i] for i in called}, called)
+    every = {name: (name, array) for name, array in arrays.items()}
+    called = [name for name in arrays if split_unit(name, SECONDS)[0] in _CALLED]
+    fit = {n: own for n, own in every.items() if own[1].shape == (count,) and n not in motion}
+    found = find_times(where, fit | {name: every[name] for name in called}, called)
     timed = asked is not None and found.columns
     own = {} if timed else declared_rate(where, said or {}, options.rate)
     if asked is not None:
-        found = FoundTimes(tuple(i for i, (name, _) in every.items() if name == asked))
+        found = FoundTimes((asked,) if asked in arrays else ())
     elif not found.columns:
         rate = options.rate or own.get("own_rate")
-        others = [
-            i
-            for i, (name, array) in fit.items()
-            if not COUNTER.search(name.lower()) and rises(array) and not counts_all(array)
-            if rate is None or _runs_at(rate, array)
-        ]
-        others = others if len(others) == 1 else []
-        found = other_times(where, fit, others, rated=rate is not None)
+        found = other_times(where, fit, rate, of_anything=True)
     if not found.columns:
         return options.clock(episode, count, **own)
     return clock_at(f"{where}: {episode}", episode, count, found, every, options, **own)
@@ -308,13 +296,6 @@ def clock_at(
     if count > 1:
         hold_together(where, {name: clock.times, **held})
     return replace(clock, ambiguities=(*found.guessed, *clock.ambiguities))
-
-
-def _runs_at(rate: float, stamps: Stamps) -> bool:
-    """Whether a column rises, in some unit of time, about as fast as frames come at a rate."""
-    step = float(np.median(np.diff(stamps.astype(float))))
-    scales = (scale for unit, scale in SECONDS.items() if unit not in ("min", "h"))
-    return any(1 / _NEARLY < step * scale * rate < _NEARLY for scale in scales)
 
 
 def hold_together(where: str, clocks: Mapping[str, Times]) -> None:

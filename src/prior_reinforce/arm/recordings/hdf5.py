@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import math
 import re
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -64,22 +65,21 @@ def read(source: Path, options: ReadOptions) -> Episodes:
 def _demo(path: Path, top: Any, within: str, options: ReadOptions, episode: str) -> Recording:
     with named_damage(path, "HDF5"):
         group = _own(path, top, within)
-        shapes = _shapes(group)
-        for name in options.key or _KEYS:  # a link within the file, too
-            found = _own(path, group, name)
-            if found is not None and name not in shapes and _is_numbers(found):
-                shapes[name] = found.shape
+        found = _arrays_in(path, group, options.key or _KEYS)
+        shapes = {name: own.shape for name, own in found.items()}
         keys = motion_keys(f"{path}: {group.name}", options, shapes, _KEYS)
-        key = keys[0]
-        arrays = {name: _numbers(path, name, _own(path, group, name)) for name in keys}
-        count = len(arrays[key])
+        key, count = keys[0], shapes[keys[0]][0]
         # Whatever may move, at any rate, or tells the time of the frames, or marks what is padding.
         there = {
-            name: _numbers(path, name, _own(path, group, name))
+            name: _numbers(path, name, found[name])
             for name, own in shapes.items()
-            if len(own) <= 2 and (own[0] == count or math.prod(own) <= _MOST_AT_OWN_RATE)
-            if math.prod(own) == count or may_move(name, math.prod(own[1:]))
-        } | arrays
+            if name in keys
+            or (
+                len(own) <= 2
+                and (own[0] == count or math.prod(own) <= _MOST_AT_OWN_RATE)
+                and (math.prod(own) == count or may_move(name, math.prod(own[1:])))
+            )
+        }
         texts, stated = _said(path, top, group, key)
         declared = int(stated.get("num_samples", count))
     if declared > count:
@@ -139,21 +139,12 @@ def _is_own(found: Any) -> bool:
     return isinstance(found, h5py.Dataset) and not (found.external or found.is_virtual)
 
 
-def _is_numbers(found: Any) -> bool:
-    """Whether an item is an array of numbers of this very file."""
-    return _is_own(found) and bool(found.shape) and found.dtype.kind in "biuf"
-
-
-def _shapes(group: Any) -> dict[str, tuple[int, ...]]:
-    """Shapes of the arrays of numbers in an episode, by their path in it."""
-    found: dict[str, tuple[int, ...]] = {}
-
-    def collect(name: str, item: Any) -> None:
-        if _is_numbers(item):
-            found[name] = item.shape
-
-    group.visititems(collect)
-    return found
+def _arrays_in(path: Path, group: Any, keys: Sequence[str]) -> dict[str, Any]:
+    """The arrays of numbers in an episode by their path in it, and those that keys link to."""
+    items: dict[str, Any] = {}
+    group.visititems(lambda name, item: items.update({name: item}))
+    items |= {key: _own(path, group, key) for key in keys}
+    return {n: a for n, a in items.items() if _is_own(a) and a.shape and a.dtype.kind in "biuf"}
 
 
 def _numbers(path: Path, name: str, found: Any) -> Stamps:

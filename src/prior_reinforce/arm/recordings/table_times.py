@@ -135,8 +135,9 @@ def time_columns(
     found = find_times(table.where, free, called)
     if found.columns:
         return found
-    rated = options.rate is not None or bool(_declared(table, above, options))
-    return other_times(table.where, free, free if len(table.names) > 1 else (), rated=rated)
+    rate = options.rate or _declared(table, above, options).get("own_rate")
+    found = other_times(table.where, free, rate, of_anything=False)
+    return found if len(table.names) > 1 else FoundTimes()
 
 
 def _columns(table: Table, chosen: Iterable[int]) -> dict[int, tuple[str, Column]]:

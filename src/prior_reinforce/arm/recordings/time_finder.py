@@ -6,7 +6,7 @@ import re
 import shlex
 from collections.abc import Collection, Mapping, Sequence
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Shaped
@@ -18,8 +18,8 @@ Times = Float[np.ndarray, " T"]
 """Times of T frames, in [s]."""
 Stamps = Shaped[np.ndarray, "..."]
 """Times of T frames as a file holds them: in its unit, of any shape and kind."""
-Columns = Mapping[int, tuple[str, Stamps]]
-"""Name and numbers of columns or arrays, by their place."""
+Columns = Mapping[Any, tuple[str, Stamps]]
+"""Name and numbers of columns by their place in a table, or of arrays by their name."""
 FRAME = "frame"
 """The unit of a column that counts frames; the rate says how long one is."""
 FEWEST_COUNTS = 20
@@ -45,6 +45,8 @@ _PERIOD = re.compile(
 """What files call the time from one frame to the next."""
 _TICKS = (6.3e17, 6.6e17)
 """Numbers that are .NET's ticks of 100 ns since the year 1, from 1997 to 2092."""
+_NEARLY = 1.25
+"""Factor within which what rises must run as fast as a rate says, to be a clock. Ours."""
 _SAME_CLOCK = 0.01
 """Share by which two clocks of a recording differ at most. Ours."""
 
@@ -52,9 +54,9 @@ _SAME_CLOCK = 0.01
 class FoundTimes(NamedTuple):
     """Which columns are the times."""
 
-    columns: tuple[int, ...] = ()
+    columns: tuple[Any, ...] = ()
     """None, one, or whole seconds and a part of a second."""
-    held: tuple[int, ...] = ()
+    held: tuple[Any, ...] = ()
     """Columns that must agree with it."""
     unit: str | None = None
     """Unit of the last column, where it is known by other columns or by its numbers."""
@@ -63,7 +65,7 @@ class FoundTimes(NamedTuple):
     guessed: tuple[Ambiguity, ...] = ()
 
 
-def find_times(where: object, columns: Columns, called: Collection[int]) -> FoundTimes:
+def find_times(where: object, columns: Columns, called: Collection[Any]) -> FoundTimes:
     """Return the times among columns, none of which is a joint, by what their names say.
 
     The first counts of those that are `called` so for certain, or rise steadily and say in some
@@ -71,45 +73,55 @@ def find_times(where: object, columns: Columns, called: Collection[int]) -> Foun
     which are summed. FileFormatError if columns of one name are times that differ.
     """
     times = [*called, *(i for i, each in columns.items() if tells_time(*each))]
-    upwards = [i for i, (name, own) in columns.items() if says_time(name) and _increases(own)]
+    upwards = [
+        i
+        for i, (name, own) in columns.items()
+        if says_time(name) and len(own) > 1 and np.all(np.diff(own.astype(float), axis=0) > 0)
+    ]
     times = times or upwards or [i for i, each in columns.items() if counts_down(*each)]
     if not times:
         periods = tuple(i for i, each in columns.items() if is_periods(*each))
         return FoundTimes(periods[:1], summed=bool(periods))
-    _refuse_several(where, columns, sorted({*times}))
+    _refuse_several(where, [own for i, own in columns.items() if i in times])
     skipping = [i for i, (_, own) in columns.items() if skips_frames(own)]
     first, *held = dict.fromkeys([*times, *upwards, *skipping])
     return FoundTimes((first,), tuple(held))
 
 
 def other_times(
-    where: object, columns: Columns, others: Collection[int], *, rated: bool
+    where: object, columns: Columns, rate: float | None, *, of_anything: bool
 ) -> FoundTimes:
-    """Return what may be the times where no name says so: what rises steadily of the `others`.
+    """Return what may be the times where no name says so: what rises steadily.
 
-    If a rate is known (`rated`), that, or a count that skips frames, is held against it; else the
-    first of them is asked about.
+    If a rate is known, that, or a count that skips frames, is held against it; else the first is
+    asked about. Columns `of_anything` count only if one of them rises and is called no counter, and
+    beside a rate if that runs nearly as fast.
     """
-    rising = [i for i in others if rises(columns[i][1])]
-    if rated:  # what counts frames one by one says nothing of it
-        skipping = [i for i, (_, own) in columns.items() if skips_frames(own)]
+    rising = [i for i, (_, own) in columns.items() if rises(own)]
+    if rate is not None or of_anything:  # what counts frames one by one says nothing
         rising = [i for i in rising if not counts_all(columns[i][1])]
+    if of_anything:
+        rising = [i for i in rising if not COUNTER.search(columns[i][0].lower())]
+        rising = [i for i in rising if rate is None or _runs_at(rate, columns[i][1])]
+        rising = rising if len(rising) == 1 else []
+    if rate is not None:
+        skipping = [i for i, (_, own) in columns.items() if skips_frames(own)]
         return FoundTimes((*skipping, *rising)[:1], unit=FRAME if skipping else None)
     if not rising:
         return FoundTimes()
-    name = (columns[rising[0]][0] or f"{rising[0] + 1}").removeprefix("column ")
+    name = columns[rising[0]][0].removeprefix("column ")
     column = f"column {name}" if name.isdigit() else name
     what = f"{where} names no times, and {column} looks like the time"
     option = f"--time-column {shlex.quote(name)}"
     return FoundTimes((rising[0],), guessed=(Ambiguity(what, option, guessed=False),))
 
 
-def _refuse_several(where: object, columns: Columns, times: Sequence[int]) -> None:
+def _refuse_several(where: object, times: Sequence[tuple[str, Stamps]]) -> None:
     """Refuse times of one name that differ: of each channel its own.
 
     pandas numbers columns that come again, `Time.1`. Half a frame is no difference.
     """
-    for (name, one), (again, other) in combinations((columns[i] for i in times), 2):
+    for (name, one), (again, other) in combinations(times, 2):
         bare, same = (re.sub(r"\.\d+$", "", each) for each in (name, again))
         if bare != same or one.shape != other.shape:
             continue
@@ -144,11 +156,6 @@ def rises(values: Stamps) -> bool:
     return bool(len(steps) > 1 and np.all(steps > 0) and steps.max() < 10 * np.median(steps))
 
 
-def _increases(values: Stamps) -> bool:
-    """Whether a column rises, steadily or not: a log of changes."""
-    return bool(len(values) > 1 and np.all(np.diff(values.astype(float)) > 0))
-
-
 def tells_time(name: str, values: Stamps) -> bool:
     """Whether a column rises steadily, and its name, its unit or its numbers say it is a time."""
     said = says_time(name) or split_unit(name, SECONDS)[1] is not None or are_ticks(values)
@@ -163,6 +170,13 @@ def counts_down(name: str, values: Stamps) -> bool:
 def counts_all(values: Stamps) -> bool:
     """Whether a column may count frames one by one, or is too short to tell."""
     return len(values) < FEWEST_COUNTS or bool(np.all(np.diff(values) == 1))
+
+
+def _runs_at(rate: float, stamps: Stamps) -> bool:
+    """Whether a column rises, in some unit of time, about as fast as frames come at a rate."""
+    step = float(np.median(np.diff(stamps.astype(float))))
+    scales = (scale for unit, scale in SECONDS.items() if unit not in ("min", "h"))
+    return any(1 / _NEARLY < step * scale * rate < _NEARLY for scale in scales)
 
 
 def skips_frames(values: Stamps) -> bool:
