@@ -11,6 +11,7 @@ from jaxtyping import Float
 
 from prior_reinforce.arm.recordings.preprocessing import copies
 from prior_reinforce.arm.recordings.selection import Selection
+from prior_reinforce.arm.recordings.takes import so_far
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.motions import Demonstrations
 
@@ -73,11 +74,6 @@ def appended(
         for name in ("outcomes_seen", "outcome_noise", "outcome_correction")
     }
     return replace(more, plans=plans, **both)
-
-
-def so_far(n: int) -> list[str]:
-    """Return what to call the demonstrations in use."""
-    return [f"demonstration {i} so far" for i in range(n)]
 
 
 def _check_alike(*said: tuple[str, object, object]) -> None:

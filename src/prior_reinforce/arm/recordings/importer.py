@@ -32,8 +32,7 @@ from prior_reinforce.arm.recordings.preprocessing import Preprocessing, at_rests
 from prior_reinforce.arm.recordings.preview import Preview
 from prior_reinforce.arm.recordings.recording import Episodes, Recording, has_files, refuse_pointers
 from prior_reinforce.arm.recordings.selection import Selection, select
-from prior_reinforce.arm.recordings.starts import ways_back
-from prior_reinforce.arm.recordings.takes import doubts_of_times
+from prior_reinforce.arm.recordings.takes import doubts_of_times, ways_back
 from prior_reinforce.arm.recordings.units import Ambiguity, listed, raise_if_ambiguous
 from prior_reinforce.arm.robots.gate_settings import GateSettings
 from prior_reinforce.arm.robots.limits import RobotLimits

@@ -17,9 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from prior_reinforce.arm.recordings.appending import so_far
 from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.selection import Selection
+from prior_reinforce.arm.recordings.takes import so_far
 from prior_reinforce.arm.recordings.units import listed
 from prior_reinforce.arm.robots.limits import RobotLimits, joint_of, with_turns
 from prior_reinforce.errors import InvalidDemonstrationsError
