@@ -10,6 +10,7 @@ import contextlib
 import re
 import shlex
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -19,7 +20,6 @@ import numpy as np
 from prior_reinforce.arm.recordings.beside import columns_beside, twin_vectors
 from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.clock import NO_COLUMN
-from prior_reinforce.arm.recordings.heads import with_heads
 from prior_reinforce.arm.recordings.naming import find_channels, numbered_like, vectors, words
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
@@ -43,9 +43,16 @@ from prior_reinforce.arm.recordings.table_times import (
     time_columns,
     with_whole_dates,
 )
-from prior_reinforce.arm.recordings.tables import PLAIN, Table, is_unnamed, read_table
+from prior_reinforce.arm.recordings.tables import (
+    PLAIN,
+    Table,
+    are_units,
+    is_unnamed,
+    is_value,
+    read_table,
+)
 from prior_reinforce.arm.recordings.time_finder import FEWEST_COUNTS, Times
-from prior_reinforce.arm.recordings.units import Ambiguity, say_names
+from prior_reinforce.arm.recordings.units import Ambiguity, known_unit, say_names
 from prior_reinforce.errors import FileFormatError
 
 SUFFIXES = (".csv", ".tsv")
@@ -55,6 +62,11 @@ _ABSENT = 9e9
 """What ABB writes for the position of an axis that is not there."""
 _MOST_WORDS = 8
 """Texts between which a column switches. Ours."""
+
+_ECHOED = ("name", "position", "velocity", "effort")
+"""Arrays of a sensor_msgs/JointState, in order."""
+_SECOND = 10**9
+"""In [ns]."""
 
 
 class LogFormat(NamedTuple):
@@ -363,3 +375,52 @@ def _by_key(
         rest = iter(columns)
         columns = [by_name[j] if j in by_name else next(rest) for j in joints]
     return columns
+
+
+def with_heads(table: Table) -> Table:
+    """Return a table under one line of names, wherever its own stand."""
+    return _of_echo(_of_levels(table))
+
+
+def _of_levels(table: Table) -> Table:
+    """Join further lines of names, as pandas writes of columns of several levels: `elbow/position`.
+
+    Such lines hold no number, date or `nan`, and the line after them does hold a number. The last
+    may say units.
+    """
+    are_numbers = ~np.isnan(table.values)
+    rows = int(np.argmax(are_numbers.any(axis=1))) if table.named and are_numbers.size else 0
+    lines = [[cells[row] for cells in table.cells] for row in range(rows)]
+    if not lines or any(is_value(cell) for line in lines for cell in line):
+        return table
+    units = table.units
+    if are_units(lines[-1], table.decimal):
+        units = tuple(map(known_unit, lines.pop()))
+    levels = zip(table.names, *lines, strict=True)
+    names = tuple("/".join(filter(None, level)) for level in levels)
+    return replace(table.rows(range(rows, len(table))), names=names, units=units)
+
+
+def _of_echo(table: Table) -> Table:
+    """Name what `ros2 topic echo --csv` writes of a JointState; return others as they are.
+
+    A row is the stamp in s and ns, the frame's name (column 3, which is no column where it is
+    empty), the joints' names, and as many positions; then velocities and efforts, if there are any.
+    """
+    texts = [i for i, cells in enumerate(table.cells) if any(map(_is_word, cells))]
+    if table.named or not texts or texts != [*range(2, texts[-1] + 1)]:
+        return table
+    stamps = table.values[:, :2]
+    if np.any(stamps != np.floor(stamps)) or np.any(stamps < 0) or np.any(stamps[:, 1] >= _SECOND):
+        return table
+    frame = ["frame_id"] if table.names[texts[0]] == "column 3" else []
+    count = len(texts) - len(frame)
+    groups, rest = divmod(len(table.names) - 1 - texts[-1], max(count, 1))
+    if count == 0 or rest or not 1 <= groups < len(_ECHOED):
+        return table
+    heads = [f"{of}{i}" for of in _ECHOED[: 1 + groups] for i in range(count)]
+    return replace(table, names=("sec", "nanosec", *frame, *heads), named=True)
+
+
+def _is_word(cell: str) -> bool:
+    return any(letter.isalpha() for letter in cell) and not is_value(cell)
