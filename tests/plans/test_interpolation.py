@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from prior_reinforce.errors import InvalidPlanError
 from prior_reinforce.plans.interpolation import interpolate
+from prior_reinforce.plans.interpolation import minimum_jerk as course
 
 
 def minimum_jerk(amplitude: float, duration: float, frames: int) -> tuple[np.ndarray, float]:
@@ -90,3 +91,9 @@ def test_interpolation_is_linear_in_the_frames(horizon, dt, seed):
 def test_bad_input_is_named(frames, dt, options):
     with pytest.raises(InvalidPlanError, match="got"):
         interpolate(frames, dt, **options)
+
+
+def test_a_minimum_jerk_course_is_held_beyond_its_ends():
+    np.testing.assert_allclose(course(np.array([-1.0, 0.0, 0.5, 1.0, 2.0])), [0, 0, 0.5, 1, 1])
+    slope = np.gradient(course(np.linspace(0, 1, 1001)), 1e-3)
+    assert abs(slope.max() - 15 / 8) < 1e-4

@@ -3,7 +3,7 @@ import pytest
 
 from prior_reinforce.errors import RenderingUnavailableError
 from prior_reinforce.simulation.tasks import make_task
-from prior_reinforce.simulation.tasks.following import follow
+from reproduction.following import follow
 from reproduction.zoo.pushes import Slide
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.simulation.tasks import make_task
-from prior_reinforce.simulation.tasks.following import warped as pace
+from reproduction.following import warped as pace
 from reproduction.zoo.human import KINDS, Manner, reach_and_strike
 
 SCOOP, LOB, GRIPPER = make_task("zoo-scoop"), make_task("zoo-lob"), make_task("zoo-gripper")

@@ -23,8 +23,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from prior_reinforce.environment import Rollout
+from prior_reinforce.plans.interpolation import minimum_jerk
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.simulation.tasks.following import smoothstep
 from prior_reinforce.simulation.tasks.panda import STEP, setpoints
 from prior_reinforce.simulation.tasks.panda_task import first_descent
 from prior_reinforce.simulation.tasks.so101 import (
@@ -171,7 +171,7 @@ def _guided(demonstrations: Demonstrations) -> Float[np.ndarray, "steps 5"]:
     n_steps = round(demonstrations.horizon * dt / STEP)
     motions, _ = setpoints(demonstrations.plans, dt, n_steps)
     path, here = [], np.zeros(5)
-    share = smoothstep(np.arange(wait) / wait)[:, None]
+    share = minimum_jerk(np.arange(wait) / wait)[:, None]
     for motion in motions:
         path += [here + share * (motion[0] - here), np.tile(motion[0], (wait, 1)), motion]
         here = motion[-1]

@@ -74,7 +74,7 @@ def patterns(demonstrations: Demonstrations) -> tuple[tuple[int, ...], ...]:
     if not agree.all():  # else no delay has anything to add, and all are long to scan
         agree |= best_correlations(flat.reshape(velocities.shape)) > _AGREE_LATER
     _, labels = connected_components(agree, directed=False)
-    motions = _pooled(shapes, units, shapes.mean(axis=0))
+    motions = motion_vectors(demonstrations)
     found = [
         tuple(way.tolist())
         for label in np.unique(labels)

@@ -43,6 +43,15 @@ class FineMotion:
     of acceleration where a hold meets the motion counts too."""
 
 
+def minimum_jerk(part: Float[np.ndarray, "*s"]) -> Float[np.ndarray, "*s"]:
+    """Return the minimum-jerk course from 0 at 0 to 1 at 1, held beyond: 10 p^3 - 15 p^4 + 6 p^5.
+
+    Source: Flash and Hogan, The coordination of arm movements, 1985.
+    """
+    part = np.clip(part, 0.0, 1.0)
+    return part**3 * (10.0 - 15.0 * part + 6.0 * part**2)
+
+
 def join_frames(frames: ArrayLike, dt: float) -> CubicSpline:
     """The spline through the frames, at rest at both ends, over [0, (H - 1) dt].
 

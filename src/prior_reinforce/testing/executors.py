@@ -13,6 +13,7 @@ from jaxtyping import Float
 
 from prior_reinforce.arm.executing.base import Executor
 from prior_reinforce.errors import RobotLimitError
+from prior_reinforce.plans.interpolation import minimum_jerk
 from prior_reinforce.plans.motions import Plan
 from prior_reinforce.plans.plan_format import PlanFormat
 
@@ -106,8 +107,8 @@ class ExecutorContract:
     def _plan(self, executor: Executor, times: float = 1.0) -> Plan:
         """A motion from where the arm stands, by `times` its reach, from rest to rest."""
         arm, start = executor.describe(), self._where(executor)
-        s = np.linspace(0, 1, round(_SECONDS / _DT) + 1)[:, None]
-        course = (10 * s**3 - 15 * s**4 + 6 * s**5) * times * np.asarray(self.reach)
+        share = minimum_jerk(np.linspace(0, 1, round(_SECONDS / _DT) + 1))
+        course = np.outer(share, times * np.asarray(self.reach))
         return Plan(start + course, PlanFormat(arm.columns, arm.units, _DT))
 
 

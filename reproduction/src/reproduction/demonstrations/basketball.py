@@ -22,8 +22,8 @@ from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.simulation.tasks.basketball import BasketballShot
 from prior_reinforce.simulation.tasks.basketball_fr3 import BasketballFR3
-from prior_reinforce.simulation.tasks.following import warped
 from reproduction.demonstrations import DRAWN, seed_and_aims, warps, write_sets
+from reproduction.following import warped
 
 HORIZON = 140
 """Frames, as in the paper."""

@@ -13,12 +13,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
+from prior_reinforce.plans.interpolation import minimum_jerk
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.simulation.tasks.curling import FRICTION, STONE_RADIUS, STONE_START, Curling
-from prior_reinforce.simulation.tasks.following import smoothstep, warped
 from prior_reinforce.simulation.tasks.inverse_kinematics import joint_paths, to_rotation_vector
 from reproduction.demonstrations import DRAWN, seed_and_aims, warps, write_sets
 from reproduction.demonstrations.teleoperation import Teleoperation, record
+from reproduction.following import warped
 
 HORIZON = 140
 """Frames, as in the paper."""
@@ -90,7 +91,7 @@ def push(
         warp: Of its pace; see `following.warped`.
     """
     part = np.clip((np.arange(horizon) * dt - start) / duration, 0.0, 1.0)
-    part = smoothstep(warped(part, warp))
+    part = minimum_jerk(warped(part, warp))
     length = speed * duration / 1.875  # a minimum-jerk stroke's peak is 15/8 of its mean speed
     forward = np.array([np.cos(heading), np.sin(heading), 0.0])
     left = np.array([-np.sin(heading), np.cos(heading), 0.0])

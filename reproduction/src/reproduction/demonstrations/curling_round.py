@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
+from prior_reinforce.plans.interpolation import minimum_jerk
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.simulation.tasks.curling import STONE_START, CurlingRound
-from prior_reinforce.simulation.tasks.following import smoothstep
 from prior_reinforce.simulation.tasks.inverse_kinematics import joint_paths
 from reproduction.demonstrations import write_sets
 from reproduction.demonstrations.curling import (
@@ -45,8 +45,8 @@ def way_round(times: Float[np.ndarray, " H"], side: float) -> Float[np.ndarray, 
         times: Since the way began, as parts of `ROUND_TIME`.
         side: 1 by the left, -1 by the right.
     """
-    ahead = BEYOND * (1.0 - smoothstep((times - 0.25) / 0.5))
-    aside = smoothstep(times / 0.4) - smoothstep((times - 0.6) / 0.4)
+    ahead = BEYOND * (1.0 - minimum_jerk((times - 0.25) / 0.5))
+    aside = minimum_jerk(times / 0.4) - minimum_jerk((times - 0.6) / 0.4)
     return np.column_stack([ahead, side * ASIDE * aside])
 
 

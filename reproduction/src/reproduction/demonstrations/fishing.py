@@ -14,11 +14,12 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
+from prior_reinforce.plans.interpolation import minimum_jerk
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.simulation.tasks.fishing import Fishing
-from prior_reinforce.simulation.tasks.following import smoothstep, warped
 from reproduction.demonstrations import DRAWN, seed_and_aims, warps, write_sets
 from reproduction.demonstrations.teleoperation import Teleoperation, record
+from reproduction.following import warped
 
 HORIZON = 140
 """Frames, as in the paper."""
@@ -83,7 +84,7 @@ def cast(
     """
     times = np.arange(HORIZON) * dt - start
     raised, thrown = (
-        smoothstep(warped(np.clip(part, 0.0, 1.0), warp))[:, None]
+        minimum_jerk(warped(np.clip(part, 0.0, 1.0), warp))[:, None]
         for part in (times / durations[0], (times - durations[0]) / durations[1])
     )
     distance, height, tilt = (

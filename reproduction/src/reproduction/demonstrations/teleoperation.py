@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from prior_reinforce.simulation.tasks.following import follow, smoothstep
+from prior_reinforce.plans.interpolation import minimum_jerk
+from reproduction.following import follow
 
 _Poses = Float[np.ndarray, "H 6"]
 
@@ -60,7 +61,7 @@ def _engaged(times: Float[np.ndarray, " H"]) -> Float[np.ndarray, "H 1"]:
     ease, still = 0.2, 0.1
     rising = np.clip(times / ease, 0.0, 1.0)
     falling = np.clip((times[-1] - still - times) / ease, 0.0, 1.0)
-    return (smoothstep(rising) * smoothstep(falling))[:, None]
+    return (minimum_jerk(rising) * minimum_jerk(falling))[:, None]
 
 
 def _tremor(

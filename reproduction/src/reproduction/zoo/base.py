@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from prior_reinforce.arrays import Frames, Point, as_plans
 from prior_reinforce.environment import Rollout, Task
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.simulation.tasks.following import follow
+from reproduction.following import follow
 from reproduction.zoo.human import Strategy, demonstrate
 
 _GONE = 100.0

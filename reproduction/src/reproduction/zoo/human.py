@@ -24,8 +24,9 @@ from numpy.typing import ArrayLike
 
 from prior_reinforce.arrays import Frames, Point, Points
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.plans.interpolation import minimum_jerk
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.simulation.tasks.following import smoothstep, warped
+from reproduction.following import warped
 
 if TYPE_CHECKING:
     from reproduction.zoo.base import ZooTask
@@ -198,7 +199,7 @@ class Manner:
                 progress = (times - start) / move.duration
             else:
                 progress = (phase - move.start) / move.duration
-            path += smoothstep(progress)[:, None] * change
+            path += minimum_jerk(progress)[:, None] * change
         return path + self.noise
 
 

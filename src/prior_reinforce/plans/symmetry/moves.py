@@ -19,6 +19,7 @@ from jaxtyping import Float
 from typing_extensions import Self
 
 from prior_reinforce.arrays import Frames
+from prior_reinforce.plans.interpolation import minimum_jerk
 from prior_reinforce.plans.kinematics import Chain, turned_path
 
 Columns = tuple[int, ...]
@@ -207,8 +208,8 @@ class TurnJoint(Move, frozen=True, tag="turn-joint"):
 
     def _moved(self, plan: Frames, amount: float) -> Moved:
         out = plan.copy()
-        x = np.clip(np.arange(len(plan)) / self.ramp, 0, 1) if self.ramp else np.ones(len(plan))
-        out[:, self.joint] += self.gain * amount * x**3 * (10 - 15 * x + 6 * x**2)
+        share = minimum_jerk(np.arange(len(plan)) / self.ramp) if self.ramp else 1.0
+        out[:, self.joint] += self.gain * amount * share
         if self.range is not msgspec.UNSET and not self.ramp:
             out[:, self.joint] = _within(out[:, self.joint], self.range)
         return out

@@ -1,14 +1,8 @@
-"""The time course of a hand, and the filter that an arm follows it with."""
+"""The filter that an arm follows a hand with."""
 
 import numpy as np
 
-from prior_reinforce.simulation.tasks.following import follow, smoothstep
-
-
-def test_smoothstep_is_the_minimum_jerk_course():
-    np.testing.assert_allclose(smoothstep(np.array([-1.0, 0.0, 0.5, 1.0, 2.0])), [0, 0, 0.5, 1, 1])
-    slope = np.gradient(smoothstep(np.linspace(0, 1, 1001)), 1e-3)
-    assert abs(slope.max() - 15 / 8) < 1e-4
+from reproduction.following import follow
 
 
 def test_the_follower_answers_a_step_like_a_critically_damped_filter():

@@ -1,16 +1,10 @@
-"""Time courses of a motion from rest to rest, and of an arm that follows another motion."""
+"""Time courses of a hand that changes its pace, and of an arm that follows another motion."""
 
 from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float
 from scipy.signal import cont2discrete, lfilter, lfiltic
-
-
-def smoothstep(part: Float[np.ndarray, "*s"]) -> Float[np.ndarray, "*s"]:
-    """From 0 to 1 along a minimum-jerk time course: 10 p^3 - 15 p^4 + 6 p^5."""
-    part = np.clip(part, 0.0, 1.0)
-    return part**3 * (10.0 - 15.0 * part + 6.0 * part**2)
 
 
 def warped(part: Float[np.ndarray, " t"], warp: Float[np.ndarray, " w"]) -> Float[np.ndarray, " t"]:
