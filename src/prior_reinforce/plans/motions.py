@@ -260,13 +260,11 @@ class Demonstrations:
         Raises:
             InvalidDemonstrationsError: There are several, and their outcomes lie in a subspace.
         """
-        with _warned_before():
-            return replace(self, symmetry=None)
+        return self._derived(symmetry=None)
 
     def with_symmetry(self, symmetry: Symmetry) -> Self:
         """Return the same demonstrations, which may be moved so."""
-        with _warned_before():
-            return replace(self, symmetry=symmetry)
+        return self._derived(symmetry=symmetry)
 
     @property
     def sha256(self) -> str:
@@ -287,14 +285,11 @@ class Demonstrations:
 
     def with_plans(self, plans: Plans, format: PlanFormat | None = None) -> Self:
         """Return the same outcomes with other plans; odd units were warned about already."""
-        with _warned_before():
-            return replace(self, plans=plans, format=format or self.format)
+        return self._derived(plans=plans, format=format or self.format)
 
     def only(self, chosen: Sequence[int]) -> Self:
         """Return some of the demonstrations, by their numbers from 0."""
-        arrays: dict[str, Any] = {name: getattr(self, name)[list(chosen)] for name in _ARRAYS}
-        with _warned_before():
-            return replace(self, **arrays)
+        return self._derived(**{name: getattr(self, name)[list(chosen)] for name in _ARRAYS})
 
     def repeated_outcomes(self) -> list[tuple[int, int]]:
         """Return pairs whose outcomes were measured and are the same; by eye they often look it."""
@@ -393,6 +388,11 @@ class Demonstrations:
                 ),
                 symmetry=(data := metadata.get("symmetry")) and Symmetry.from_data(data),
             )
+
+    def _derived(self, **changes: Any) -> Self:
+        """The same but for some fields; of its units it was warned already."""
+        with _warned_before():
+            return replace(self, **changes)
 
     def _fitting(self, symmetry: Symmetry) -> Symmetry:
         """The symmetry, held against these demonstrations, its chart around their outcomes."""

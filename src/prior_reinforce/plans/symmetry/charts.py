@@ -11,8 +11,6 @@ x and y. Components beyond those that a chart names stay as they are (a time of 
 
 from __future__ import annotations
 
-from typing import Any
-
 import msgspec
 import numpy as np
 from jaxtyping import Float
@@ -28,23 +26,23 @@ _LEAST = 1e-6
 
 
 class Chart(msgspec.Struct, frozen=True):
-    """The interface; members are data, so that they can be saved."""
+    """The interface, and outcomes as they are; members are data, so that they can be saved."""
 
     def to(self, outcomes: Outcomes) -> Outcomes:
         """Return z of outcomes."""
-        raise NotImplementedError
+        return np.array(outcomes, dtype=np.float64)
 
     def back(self, z: Outcomes) -> Outcomes:
         """Return the outcomes of z."""
-        raise NotImplementedError
+        return np.array(z, dtype=np.float64)
 
     def jacobian(self, z: Outcomes) -> Jacobian:
         """Return dr/dz, rows the components of r, columns those of z."""
-        raise NotImplementedError
+        return np.broadcast_to(np.eye(z.shape[-1]), (*z.shape, z.shape[-1])).copy()
 
     def units(self, units: tuple[str, ...]) -> tuple[str, ...]:
         """Return the units of z, of outcomes with these units."""
-        raise NotImplementedError
+        return units
 
     def around(self, outcomes: Points) -> Self:
         """Return the chart with no jump in the midst of these outcomes."""
@@ -64,7 +62,7 @@ class Polar(Chart, frozen=True, tag="polar"):
 
     def to(self, outcomes: Outcomes) -> Outcomes:
         """See `Chart.to`."""
-        out = np.array(outcomes, dtype=np.float64)
+        out = super().to(outcomes)
         x, y = out[..., 0] - self.centre[0], out[..., 1] - self.centre[1]
         out[..., 0] = np.log(np.maximum(np.hypot(x, y), _LEAST))
         cos, sin = np.cos(self.ahead), np.sin(self.ahead)
@@ -73,7 +71,7 @@ class Polar(Chart, frozen=True, tag="polar"):
 
     def back(self, z: Outcomes) -> Outcomes:
         """See `Chart.back`."""
-        out = np.array(z, dtype=np.float64)
+        out = super().back(z)
         distance = np.exp(z[..., 0])
         out[..., 0] = self.centre[0] + distance * np.cos(z[..., 1])
         out[..., 1] = self.centre[1] + distance * np.sin(z[..., 1])
@@ -81,7 +79,7 @@ class Polar(Chart, frozen=True, tag="polar"):
 
     def jacobian(self, z: Outcomes) -> Jacobian:
         """See `Chart.jacobian`."""
-        out = _identity(z)
+        out = super().jacobian(z)
         x, y = np.exp(z[..., 0]) * np.array([np.cos(z[..., 1]), np.sin(z[..., 1])])
         out[..., 0, 0], out[..., 0, 1], out[..., 1, 0], out[..., 1, 1] = x, -y, y, x
         return out
@@ -102,19 +100,19 @@ class LogDistance(Chart, frozen=True, tag="log-distance"):
 
     def to(self, outcomes: Outcomes) -> Outcomes:
         """See `Chart.to`."""
-        out = np.array(outcomes, dtype=np.float64)
+        out = super().to(outcomes)
         out[..., 0] = np.log(np.maximum(out[..., 0], _LEAST))
         return out
 
     def back(self, z: Outcomes) -> Outcomes:
         """See `Chart.back`."""
-        out = np.array(z, dtype=np.float64)
+        out = super().back(z)
         out[..., 0] = np.exp(out[..., 0])
         return out
 
     def jacobian(self, z: Outcomes) -> Jacobian:
         """See `Chart.jacobian`."""
-        out = _identity(z)
+        out = super().jacobian(z)
         out[..., 0, 0] = np.exp(z[..., 0])
         return out
 
@@ -126,25 +124,5 @@ class LogDistance(Chart, frozen=True, tag="log-distance"):
 class Cartesian(Chart, frozen=True, tag="cartesian"):
     """Outcomes as they are."""
 
-    def to(self, outcomes: Outcomes) -> Outcomes:
-        """See `Chart.to`."""
-        return np.array(outcomes, dtype=np.float64)
-
-    def back(self, z: Outcomes) -> Outcomes:
-        """See `Chart.back`."""
-        return np.array(z, dtype=np.float64)
-
-    def jacobian(self, z: Outcomes) -> Jacobian:
-        """See `Chart.jacobian`."""
-        return _identity(z)
-
-    def units(self, units: tuple[str, ...]) -> tuple[str, ...]:
-        """See `Chart.units`."""
-        return units
-
 
 AnyChart = Polar | LogDistance | Cartesian
-
-
-def _identity(z: Outcomes) -> Any:
-    return np.broadcast_to(np.eye(z.shape[-1]), (*z.shape, z.shape[-1])).copy()
