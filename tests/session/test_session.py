@@ -460,12 +460,13 @@ def test_where_a_correction_does_not_pass_the_last_plan_that_does_is_tried_once(
     trial = session.ask()
     assert 0.99 < trial.condition[0] <= 1.0
     np.testing.assert_array_equal(trial.plan[0], trial.condition)
+    assert trial.beyond
     assert trial.remark.startswith("moved only as far as passes, which may not do (1.2 is beyond")
     session.tell(2, [-0.2, 0.0])
     with pytest.raises(RobotLimitError, match=r"trial 2 went as far as passes, and missed: demon"):
         session.ask()
     session.amend(2, [0.05, 0.0])
-    assert session.ask().remark == ""
+    assert (session.ask().remark, session.ask().beyond) == ("", False)
 
 
 def test_a_plan_that_is_as_far_as_may_be_is_refused_once_it_missed():
@@ -475,6 +476,7 @@ def test_a_plan_that_is_as_far_as_may_be_is_refused_once_it_missed():
     session.adapter._expect = lambda *of: beyond
     session.adapter._propose = lambda goal: goal
     session.tell(session.ask().number, hit=False)
+    assert session.ask().beyond
     session.tell(session.ask().number, [0.001, 0.02])
     with pytest.raises(OutOfReachError, match="trial 2 made the same plan and missed: the goal is"):
         session.ask()

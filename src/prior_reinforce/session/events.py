@@ -63,6 +63,8 @@ class Asked(Event, frozen=True):
     expected_error: list[float] | None = None
     expected_sd: list[float] | None = None
     remark: str = ""
+    beyond: bool = False
+    """See `trials.Trial.beyond`."""
 
 
 class Told(Event, frozen=True):

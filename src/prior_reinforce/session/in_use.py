@@ -112,18 +112,23 @@ class InUse:
 
         `limited` says by what limits it falls short of what the adapter asked for.
         """
-        goal, expected = latest_goal(state), self.expected(state, condition)
+        expected = self.expected(state, condition)
+        p_hit = trials = error = sd = None
+        if expected is not None:
+            p_hit, trials = expected.p_hit, expected.trials
+            error, sd = expected.error, expected.sd
         return Asked(
             trial=len(state.trials) + 1,
-            goal=goal.number,
+            goal=latest_goal(state).number,
             condition=condition.tolist(),
             model=self.names[0],
             gate=None if verdict is None else verdict.as_json(),
-            p_hit=None if expected is None else expected.p_hit,
-            expected_trials=None if expected is None else expected.trials,
-            expected_error=None if expected is None else _as_list(expected.error),
-            expected_sd=None if expected is None else _as_list(expected.sd),
+            p_hit=p_hit,
+            expected_trials=trials,
+            expected_error=_as_list(error),
+            expected_sd=_as_list(sd),
             remark="; ".join(filter(None, (limited, self._remark(state, expected)))),
+            beyond=bool(limited or (expected and expected.beyond and not expected.nearer)),
         )
 
     def _remark(self, state: State, expected: Expectation | None) -> str:

@@ -118,6 +118,8 @@ class Trial:
     """Its standard deviation, likewise."""
     remark: str = ""
     """What its adapter had to say beforehand (`Expectation.remark`)."""
+    beyond: bool = False
+    """Whether plans may not be moved as far as its goal: only a nearer demonstration helps."""
     model: str = ""
     """Which model planned it: the name of its folder in a workspace, else empty."""
     gate: dict[str, Any] | None = None

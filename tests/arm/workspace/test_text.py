@@ -1,7 +1,10 @@
 """Where a workspace stands, in words."""
 
+from dataclasses import replace
+
 import pytest
 
+from prior_reinforce.arm.workspace.text import say_expectation
 from tests.arm.workspace.planar import amend, ask, describe, tell
 
 
@@ -32,6 +35,16 @@ def test_trials_that_are_not_shown_are_counted(workspace):
     assert "2 more" in text
     assert "trial 3" in text
     assert "trial 2" not in text
+
+
+def test_advice_is_left_out_where_a_remark_has_given_it_in_whatever_words(workspace):
+    for error in (0.2, -0.2, 0.2):
+        tell(workspace, ask(workspace).number, [error, 0.0])
+    poor = replace(ask(workspace), p_hit=0.01, remark="too far: demonstrate near it")
+    advice = "\n".join(say_expectation(workspace.standing, poor))
+    assert "what would help" in advice
+    told = say_expectation(workspace.standing, replace(poor, beyond=True))
+    assert "what would help" not in "\n".join(told)
 
 
 @pytest.mark.slow

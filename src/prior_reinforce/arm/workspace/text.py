@@ -80,7 +80,7 @@ def say_expectation(now: Standing, trial: Trial) -> list[str]:
     if told and told[-1].surprise:
         lines.append(f"trial {told[-1].number} was {told[-1].surprise}")
     missed = sum(known.goal_number == trial.goal_number for known in told)
-    poor = trial.p_hit < _POOR_CHANCE and "demonstrate nearer" not in trial.remark
+    poor = trial.p_hit < _POOR_CHANCE and not trial.beyond
     if missed >= _POOR_TRIALS and not state.solved and poor:
         lines.append(
             "what would help: a demonstration near this goal, or a finer look at the next trial "
