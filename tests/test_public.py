@@ -21,7 +21,7 @@ HEAVY = {
     "matplotlib",
     "joblib",
     "imageio_ffmpeg",
-    "openai",
+    "httpx",
     "scipy.interpolate",
     "scipy.special",
     "scipy.optimize",

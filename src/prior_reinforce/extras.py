@@ -18,7 +18,6 @@ EXTRA_OF = {
     "joblib": "simulation",
     "threadpoolctl": "simulation",
     "imageio_ffmpeg": "simulation",
-    "openai": "vlm",
     "httpx": "vlm",
     "pyarrow": "lerobot",
     "rosbags": "ros",
