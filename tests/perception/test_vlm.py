@@ -315,7 +315,7 @@ class Slanted:
         self.picture = np.zeros((1080, 1920, 3), np.uint8)
 
     def verdict(self, places, loose, *, swaps=False):
-        """The goal's sighting, of boxes so many times as large as a ball and as a flat ring."""
+        """Why boxes so many times as large as a ball, and as a flat ring, are read wrongly."""
         how, found = VisionLanguageModelConfig(family="qwen2.5-vl"), []
         for i, wanted in enumerate((SCENE.reached, SCENE.goal)):
             centre = self.calibration.to_pixels(places[i])
@@ -326,20 +326,20 @@ class Slanted:
         with VisionLanguageModel(
             SCENE, how, client=ColourClient(), calibration=self.calibration
         ) as perception:
-            return perception._of_one_scale(*found, self.picture)
+            return perception._misread(*found, self.picture)
 
 
 def test_too_large_boxes_in_pixels_of_a_slanted_camera_are_not_taken_for_swapped_ones(slanted):
     rng, told = np.random.default_rng(0), []
     for _ in range(60):
         places = rng.uniform([0.6, -0.4], [1.3, 0.4], size=(2, 2))
-        told.append(slanted.verdict(places, rng.uniform(1.15, 1.35, size=(2, 2))).problem or "")
+        told.append(slanted.verdict(places, rng.uniform(1.15, 1.35, size=(2, 2))))
     assert not any("swapped" in problem for problem in told)
 
 
 def test_swapped_boxes_of_which_no_family_is_read_say_so(slanted):
     places = [[1.3, -0.4], [1.2, -0.3]]
-    problem = slanted.verdict(places, np.ones((2, 2)), swaps=True).problem
+    problem = slanted.verdict(places, np.ones((2, 2)), swaps=True)
     assert "only with x and y swapped: 'qwen2.5-vl' is read x first" in problem
     assert problem.endswith("and no family is read so")
     assert "set family to" not in problem

@@ -14,7 +14,6 @@ import os
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import msgspec
 import numpy as np
@@ -30,18 +29,30 @@ _Pairs = Float[np.ndarray, "n 2"]
 _Row = tuple[float, float, float]
 
 
-class _Saved(msgspec.Struct):
-    """What a file holds; its numbers are finite, as JSON's are."""
+class _Saved(
+    msgspec.Struct,
+    tag_field="kind",
+    tag="prior-reinforce table calibration 2",
+    rename={
+        "picture": "picture_px",
+        "height": "height_m",
+        "fit_error": "fit_error_m",
+        "left_out_error": "left_out_error_m",
+        "worst_sd": "worst_sd_m",
+        "clicked": "clicked_px",
+        "exif": "exif_orientation",
+    },
+):
+    """What a file holds of a `TableCalibration`; its numbers are finite, as JSON's are."""
 
-    kind: Literal["prior-reinforce table calibration 2"]
-    picture_px: tuple[int, int] | None
     homography: tuple[_Row, _Row, _Row]
-    height_m: float
-    fit_error_m: float
-    left_out_error_m: float | None
-    worst_sd_m: float = 0.0
-    clicked_px: tuple[float, float, float, float] | None = None
-    exif_orientation: int | None = None
+    height: float
+    fit_error: float
+    left_out_error: float | None
+    picture: tuple[int, int] | None
+    worst_sd: float = 0.0
+    clicked: tuple[float, float, float, float] | None = None
+    exif: int | None = None
 
 
 # Singular values of the design matrix below this share of the largest count as zero: points on
@@ -162,7 +173,11 @@ class TableCalibration:
         fit_error = _rms(_map(np.linalg.inv(homography), seen) - points)
         misses, _ = left_out_errors(points, seen)
         left_out = None if np.isnan(misses).all() else float(np.sqrt(np.nanmean(misses**2)))
-        worst = _worst_sd(homography, points, seen, picture)
+        # Of four points nothing is left over that would show the pixels' noise.
+        n_free = max(2 * len(points) - 8, 1)
+        residual = np.linalg.norm(_map(homography, points) - seen) / np.sqrt(n_free)
+        per_pixel = _worst_sd_per_pixel(homography, points, picture)
+        worst = per_pixel * float(max(_CLICK_SD, residual))
         clicked = *seen.min(axis=0).tolist(), *seen.max(axis=0).tolist()
         return cls(homography, float(height), fit_error, left_out, picture, worst, clicked)
 
@@ -272,18 +287,10 @@ class TableCalibration:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the calibration as JSON."""
-        saved = {
-            "kind": "prior-reinforce table calibration 2",
-            "picture_px": self.picture,
-            "homography": self.homography.tolist(),
-            "height_m": self.height,
-            "fit_error_m": self.fit_error,
-            "left_out_error_m": self.left_out_error,
-            "worst_sd_m": self.worst_sd,
-            "clicked_px": self.clicked,
-            "exif_orientation": self.exif,
-        }
-        files.write(Path(path), json.dumps(saved, indent=2) + "\n")
+        saved = _Saved(**vars(self) | {"homography": self.homography.tolist()})
+        files.write(
+            Path(path), json.dumps(msgspec.to_builtins(saved, enc_hook=float), indent=2) + "\n"
+        )
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> TableCalibration:
@@ -299,16 +306,7 @@ class TableCalibration:
             raise FileFormatError(
                 f"{path} is not a table calibration ({error}); write one with TableCalibration.save"
             ) from error
-        return cls(
-            np.array(saved.homography),
-            saved.height_m,
-            saved.fit_error_m,
-            saved.left_out_error_m,
-            saved.picture_px,
-            saved.worst_sd_m,
-            saved.clicked_px,
-            saved.exif_orientation,
-        )
+        return cls(**msgspec.structs.asdict(saved) | {"homography": np.array(saved.homography)})
 
 
 def _direct_linear_transform(points: _Pairs, pixels: _Pairs) -> Float[np.ndarray, "3 3"]:
@@ -340,21 +338,6 @@ def _design(table: Float[np.ndarray, "n 3"], pixels: _Pairs) -> Float[np.ndarray
     """Rows that are zero times H: of all u, then of all v."""
     none, (u, v) = np.zeros_like(table), pixels.T[:, :, None]
     return np.block([[table, none, -u * table], [none, table, -v * table]])
-
-
-def _worst_sd(
-    homography: Float[np.ndarray, "3 3"],
-    points: _Pairs,
-    pixels: _Pairs,
-    picture: tuple[int, int] | None,
-) -> float:
-    """Largest standard deviation of a component around the points, in [m].
-
-    The pixels' noise is as their residuals show it and at least `_CLICK_SD`.
-    """
-    n_free = max(2 * len(points) - 8, 1)  # of four points nothing is left over
-    residual = np.linalg.norm(_map(homography, points) - pixels) / np.sqrt(n_free)
-    return _worst_sd_per_pixel(homography, points, picture) * float(max(_CLICK_SD, residual))
 
 
 def _worst_sd_per_pixel(

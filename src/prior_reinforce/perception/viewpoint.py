@@ -42,8 +42,7 @@ def possible_places(calibration: TableCalibration) -> Float[np.ndarray, "n 3"]:
         axes = left @ right
         turn = np.column_stack([axes, np.cross(*axes.T)])
         shift = centred[:, 2] / [focal, focal, 1.0] / stretch.mean()
-        seen = (on_table - near) @ axes.T + shift
-        misses.append(np.linalg.norm(focal * seen[:, :2] / seen[:, 2:] + middle - corners) / 2)
+        misses.append(_miss(focal, (on_table - near) @ axes.T + shift, corners - middle))
         places.append([*near, calibration.height] - turn.T @ shift)
     return np.array(places)[np.array(misses) <= min(misses) + _SLACK]
 
@@ -65,8 +64,7 @@ def miss_from(calibration: TableCalibration, camera: Float[np.ndarray, "3"]) -> 
         rays = np.column_stack([corners - middle, np.full(4, focal)])
         left, _, right = np.linalg.svd(rays.T @ towards)
         turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
-        seen = towards @ turn.T
-        misses.append(np.linalg.norm(focal * seen[:, :2] / seen[:, 2:] + middle - corners) / 2)
+        misses.append(_miss(focal, towards @ turn.T, corners - middle))
     return float(min(misses))
 
 
@@ -94,6 +92,11 @@ def camera_costs(
             )
             costs.append(float(np.linalg.norm(there - here, axis=1).max()))
     return min(costs, default=0.0)
+
+
+def _miss(focal: float, at: Float[np.ndarray, "4 3"], seen: Float[np.ndarray, "4 2"]) -> float:
+    """How far places before a camera, in any unit, are from where they are seen, rms, in [px]."""
+    return float(np.linalg.norm(focal * at[:, :2] / at[:, 2:] - seen) / 2)
 
 
 def _corners(box: tuple[float, float, float, float] | None) -> Float[np.ndarray, "4 2"]:

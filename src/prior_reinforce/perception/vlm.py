@@ -128,7 +128,9 @@ class VisionLanguageModel(Perception):
         goal = goal_place = goal_pixel = None
         reached = self.find(self.scene.reached, picture)
         if reached.problem is None:
-            goal = self._of_one_scale(reached, self.find(self.scene.goal, picture), picture)
+            goal = self.find(self.scene.goal, picture)
+            if problem := self._misread(reached, goal, picture):
+                goal = replace(goal, place=None, problem=problem)
             if goal.place is not None:
                 goal_place = goal.place + np.array(self.scene.goal_offset)
                 x, y = self._in(picture).to_pixels(goal_place).tolist()
@@ -164,31 +166,28 @@ class VisionLanguageModel(Perception):
             )
         return self._calibration.in_picture((picture.shape[1], picture.shape[0]))
 
-    def _of_one_scale(self, reached: Sighting, goal: Sighting, picture: Picture) -> Sighting:
-        """The goal's object, without its place where both objects' boxes are read wrongly.
+    def _misread(self, reached: Sighting, goal: Sighting, picture: Picture) -> str:
+        """Why both objects' boxes are read wrongly, if they are.
 
         Then both fit with x and y swapped only, both look smaller or larger than they are, or both
         as flat as the picture is.
         """
         if reached.box is None or goal.box is None:
-            return goal
+            return ""
         calibration, (tall, wide) = self._in(picture), picture.shape[:2]
         found = [(reached.box, self.scene.reached.size), (goal.box, self.scene.goal.size)]
         (_, one), (_, other) = found
         if not _alike(one, other) and np.allclose(reached.box, goal.box, rtol=0, atol=1):
-            return replace(goal, place=None, problem="the model gives one box for both objects")
+            return "the model gives one box for both objects"
         read = [_misfit(box, calibration, size) for box, size in found]
         swapped = [_misfit(self._swapped(box, wide / tall), calibration, s) for box, s in found]
         if _fits_better(swapped, read):
-            return replace(goal, place=None, problem=f"both boxes fit {self._other_order()}")
-        exchanged = [_misfit(reached.box, calibration, found[1][1])]
-        exchanged += [_misfit(goal.box, calibration, found[0][1])]
+            return f"both boxes fit {self._other_order()}"
+        exchanged = [_misfit(reached.box, calibration, other), _misfit(goal.box, calibration, one)]
         if _fits_better(exchanged, read):
-            return replace(
-                goal,
-                place=None,
-                problem=f"both boxes fit only with {reached.words} and {goal.words} exchanged: "
-                "does the model take one for the other, are the sizes right?",
+            return (
+                f"both boxes fit only with {reached.words} and {goal.words} exchanged: does the "
+                "model take one for the other, are the sizes right?"
             )
         small, large, flat = np.array([_against(box, calibration, size) for box, size in found]).T
         if small.max() < _TOO_SMALL and _alike(*small):
@@ -201,14 +200,12 @@ class VisionLanguageModel(Perception):
         ):
             seen = "as flat as the picture"
         else:
-            return goal
+            return ""
         unsized = "is the picture as large as that in which the camera was calibrated, "
-        return replace(
-            goal,
-            place=None,
-            problem=f"both objects look {seen}: {unsized if calibration.picture is None else ''}"
-            "is the model family set right, does the server shrink pictures (then set "
-            "max_image_side), are the sizes right?",
+        return (
+            f"both objects look {seen}: {unsized if calibration.picture is None else ''}is the "
+            "model family set right, does the server shrink pictures (then set max_image_side), "
+            "are the sizes right?"
         )
 
     def _swapped(self, box: Box, wide: float) -> Box:
@@ -315,19 +312,24 @@ def _against(box: Box, calibration: TableCalibration, size: float) -> tuple[floa
 
     That is how many times a flat disc's, a ball's, and how far between the two shapes; 1 if so.
     """
-    left, top, right, bottom = box
-    sides = np.array([right - left, bottom - top])
-    disc, ball = calibration.seen(np.array([(left + right) / 2, (top + bottom) / 2]), size)
+    sides, disc, ball = _sides(box, calibration, size)
     shape, shapes = sides[0] / sides[1], sorted((1.0, disc[0] / disc[1]))
     return (sides / disc).max(), (sides / ball).min(), shape / np.clip(shape, *shapes)
 
 
 def _misfit(box: Box, calibration: TableCalibration, size: float) -> float:
     """How many times a side is above a ball's of this size [m] there, or below a flat disc's."""
-    left, top, right, bottom = box
-    sides = np.array([right - left, bottom - top])
-    disc, ball = calibration.seen(np.array([(left + right) / 2, (top + bottom) / 2]), size)
+    sides, disc, ball = _sides(box, calibration, size)
     return max((sides / ball).max(), (disc / sides).max())
+
+
+def _sides(
+    box: Box, calibration: TableCalibration, size: float
+) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2"], float]:
+    """Width and height of a box, of a flat disc of this size [m] there, and the side of a ball."""
+    left, top, right, bottom = box
+    middle = np.array([(left + right) / 2, (top + bottom) / 2])
+    return np.array([right - left, bottom - top]), *calibration.seen(middle, size)
 
 
 def _fits_better(swapped: list[float], read: list[float]) -> bool:
