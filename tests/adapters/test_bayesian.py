@@ -311,9 +311,7 @@ def test_p_hit_is_the_share_of_sampled_outcomes_within_the_tolerance(k, toleranc
         throw(adapter, goal, 0.05 * np.ones(k))
     condition = adapter.propose(goal) + 0.03
     inside = []
-    for share, history in zip(
-        adapter._trials._probabilities, adapter._trials._histories, strict=True
-    ):
+    for share, history in adapter._trials._weighed():
         at = adapter._trials._places(adapter._trials._normalisation.apply(condition[None]), goal)
         mean, variance = history.predict(adapter._trials._prior, at, adapter._trials._memory)
         weights = history.posterior.model_weights
@@ -486,7 +484,8 @@ def test_misses_before_a_change_are_judged_by_the_hardware_of_then():
         if proposes:
             adapter.propose(GOAL)
         adapter.change_hardware()
-        assert len(adapter._trials._misses().numbers) == 0
+        told = adapter._trials._memory
+        assert len(told.bare_misses(told.aims).numbers) == 0
         conditions.append(adapter.propose(GOAL))
     np.testing.assert_array_equal(*conditions)
 

@@ -40,6 +40,15 @@ def test_two_hundred_trials_are_made_fewer_and_hardly_missed():
     assert np.median(off) < 0.004
 
 
+def test_a_bare_miss_is_one_of_the_latest_whose_reading_leaves_a_hit_possible():
+    """Seen 2, or 0.5, of a tolerance off, or anywhere; the same told nine trials ago; and a hit."""
+    at = np.zeros((12, 1))
+    low = np.array([[-np.inf], *[[5.0]] * 7, [2.0], [0.5], [-np.inf], [0.0]])
+    radius = np.ones((12, 1)) * (np.arange(12) < 11)[:, None]
+    known = Memory(at, np.arange(12), at, low, np.where(np.isinf(low), np.inf, low), at, radius)
+    assert known.bare_misses(known.aims).numbers.tolist() == [9, 10]
+
+
 @pytest.mark.parametrize("k", [1, 2, 3])
 def test_where_all_around_was_tried_it_is_looked_farther_off(k):
     """An hour of misses of which nothing was told but that: somewhere is always left."""

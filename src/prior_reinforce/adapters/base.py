@@ -6,9 +6,9 @@ import hashlib
 import json
 import os
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,8 +19,9 @@ from prior_reinforce.files import open_npz
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import Reading
 
-_STATE = 2
+_STATE = 3
 """Version of what `state` gives, part of the key, so that states kept before are not resumed."""
+_Arrays = TypeVar("_Arrays")
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +52,10 @@ class State:
     """Of JSON types."""
     arrays: dict[str, np.ndarray]
     """Of numbers."""
+
+    def made(self, kind: type[_Arrays]) -> _Arrays:
+        """Make an object that is nothing but arrays of its fields' names."""
+        return kind(*(self.arrays[field.name] for field in fields(kind)))  # type: ignore[arg-type]
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write an `.npz`: the arrays and a JSON text."""

@@ -24,17 +24,18 @@ from jaxtyping import Bool, Float
 from prior_reinforce.adapters.displacement import DisplacementPrior
 from prior_reinforce.adapters.expectation_propagation import Posterior, Readings, infer, tilted
 from prior_reinforce.adapters.memory import Memory, Places
-from prior_reinforce.arrays import Point
 
 _LEAST_ODDS = 1e-3
 """Histories less probable than this part of the most probable one are dropped (ours)."""
 _MOST = 6
 """Histories that are kept at most (ours)."""
+NOTHING = 0.1
+"""Probability that nothing has changed although it was said (ours)."""
 _WIDTH = 8.0
 """W of `expectation_propagation`: a trial that was told wrongly may be told anywhere in that."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Change:
     """Something is different from one trial on."""
 
@@ -43,18 +44,8 @@ class Change:
     shift_sd: float
     """By how much all that it concerns may be shifted; 0 where hardware was changed, which does not
     shift all by the same."""
-    goal: Point | None = None
+    goal: tuple[float, ...] | None = None
     """The only goal that it concerns, which was moved; None where it concerns all."""
-
-    def data(self) -> list[Any]:
-        """It as plain data: what `Change` takes."""
-        return [self.since, self.shift_sd, None if self.goal is None else self.goal.tolist()]
-
-    @classmethod
-    def of(cls, data: Sequence[Any]) -> Change:
-        """Make it of what `data` gave."""
-        since, shift_sd, goal = data
-        return cls(since, shift_sd, None if goal is None else np.array(goal))
 
     def concerns(self, places: Places) -> Bool[np.ndarray, " p"]:
         """Which of them it concerns."""
@@ -71,6 +62,11 @@ class Change:
         return np.asarray(both * prior.of_change(a.conditions, b.conditions))
 
 
+def changes_of(data: Any) -> tuple[Change, ...]:
+    """Make changes of plain data: what `dataclasses.astuple` gives of each."""
+    return tuple(Change(since, sd, goal and tuple(goal)) for since, sd, goal in data)
+
+
 @dataclass(frozen=True, eq=False)
 class History:
     """What is taken to have happened so far, and what follows for displacements."""
@@ -80,6 +76,10 @@ class History:
     """Numbers of trials that were told wrongly."""
     log_prior: float
     posterior: Posterior
+
+    def then(self, log_p: float, *changes: Change) -> History:
+        """The same where more happened, of that log probability."""
+        return replace(self, changes=(*self.changes, *changes), log_prior=self.log_prior + log_p)
 
     @property
     def log_weight(self) -> float:
@@ -183,29 +183,28 @@ def split(
     happened = [
         (config.p_change / 2, Change(number, 0.0)),
         (config.p_change / 2, Change(number, config.shift_sd)),
-        (config.p_misplaced, Change(number, config.shift_sd, goal)),
+        (config.p_misplaced, Change(number, config.shift_sd, tuple(goal.tolist()))),
     ]
     nothing = 1.0 - config.p_mistaken - sum(p for p, _ in happened)
     histories, before = list(histories), prior.mean(new.conditions)
     each = [history.predict(prior, new, memory) for history in histories]
     mean, variance = (np.stack(of)[:, None] for of in zip(*each, strict=True))
-    more = [0.0, *(change.covariance(prior, new, new)[0, 0] for _, change in happened if change)]
+    more = [0.0, *(change.covariance(prior, new, new)[0, 0] for _, change in happened)]
     blurred = variance + np.reshape(more, (-1, 1, 1, 1))
     log_z, _, _ = tilted(mean - before, blurred, _readings(prior, new))
     with np.errstate(divide="ignore"):
         share = np.log([history.posterior.model_weights for history in histories])
     told = np.logaddexp.reduce(log_z[..., 0] + share[:, None], axis=2).sum(axis=-1)
     wrong = float(np.log(config.p_mistaken) + flat)
+    ways: list[tuple[float, tuple[Change, ...]]] = [(nothing, ())]
+    ways += [(p, (change,)) for p, change in happened]
     scored = []
     for history, under in zip(histories, told.tolist(), strict=True):
-        for (p, change), log_p in zip([(nothing, None), *happened], under, strict=True):
-            changes = history.changes if change is None else (*history.changes, change)
-            after = replace(history, changes=changes, log_prior=history.log_prior + np.log(p))
+        for (p, changes), log_p in zip(ways, under, strict=True):
+            after = history.then(float(np.log(p)), *changes)
             scored.append((history.log_weight + np.log(p) + log_p, after))
-        after = replace(
-            history, mistaken=history.mistaken | {number}, log_prior=history.log_prior + wrong
-        )
-        scored.append((history.log_weight + wrong, after))
+        mistaken = replace(history.then(wrong), mistaken=history.mistaken | {number})
+        scored.append((history.log_weight + wrong, mistaken))
     scored.sort(key=lambda pair: -pair[0])
     least = scored[0][0] + np.log(_LEAST_ODDS)
     return [history for score, history in scored[:_MOST] if score > least]

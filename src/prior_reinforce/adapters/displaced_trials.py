@@ -7,16 +7,17 @@ from __future__ import annotations
 
 import copy
 import math
-from dataclasses import fields, replace
+from collections.abc import Iterator
+from dataclasses import astuple, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from prior_reinforce.adapters.base import Expectation, State
-from prior_reinforce.adapters.change_points import Change, History, split, told
+from prior_reinforce.adapters.change_points import NOTHING, Change, History, changes_of, split, told
 from prior_reinforce.adapters.displacement import BayesianConfig, DisplacementPrior
 from prior_reinforce.adapters.expectation_propagation import Posterior, Readings, infer
-from prior_reinforce.adapters.memory import LATEST, Memory, Places, tried_again, untried_around
+from prior_reinforce.adapters.memory import Memory, Places, tried_again, untried_around
 from prior_reinforce.adapters.p_hit import Belief, Targets, p_hit_after, share_within, trials_to_go
 from prior_reinforce.arrays import Point, Points
 from prior_reinforce.plans.motions import Demonstrations
@@ -37,14 +38,9 @@ _HARDLY = 0.02
 """Where the probability of a hit is less, what was learned is no guide (ours)."""
 _NOMINAL = 0.1
 """Tolerance where no trial told one, in spreads (ours): theirs is 0.02 to 0.3."""
-_NOTHING = 0.1
-"""Probability that nothing has changed although it was said (ours)."""
 _TEACHING_SD = 0.1
 """How finely a trial that is made to learn from is read, in spreads (ours): "5 cm" by eye is an
 interval of 4 cm, whose standard deviation is 1.2 cm of 12 to 18."""
-_BLUR = 2.0
-"""Standard deviations of a reading within which it leaves a hit possible (ours): only then a miss
-says more than its reading, where words are coarse, or numbers noisy."""
 _REPEATABLE = 0.3
 """What missed would miss again: executions of one plan are then taken to lie no farther apart than
 this share of the tolerance, as a standard deviation (ours). On our own tasks it is 0.13 to 0.30."""
@@ -118,7 +114,7 @@ class DisplacedTrials:
         return State(
             {
                 "histories": [
-                    [[change.data() for change in h.changes], sorted(h.mistaken), h.log_prior]
+                    [list(map(astuple, h.changes)), sorted(h.mistaken), h.log_prior]
                     for h in histories
                 ],
                 "now": self._now,
@@ -131,27 +127,19 @@ class DisplacedTrials:
 
     def resume(self, state: State) -> None:
         """Go on from what `state` gave."""
-        arrays, self._now = state.arrays, state.facts["now"]
-        self._memory = Memory(*(arrays[field.name] for field in fields(Memory)))
-        posterior = Posterior(*(arrays[field.name] for field in fields(Posterior)))
+        self._now, self._memory = state.facts["now"], state.made(Memory)
+        posterior = state.made(Posterior)
         self._histories = [
-            History(
-                tuple(map(Change.of, changes)), frozenset(mistaken), log_prior, posterior.under(h)
-            )
+            History(changes_of(changes), frozenset(mistaken), log_prior, posterior.under(h))
             for h, (changes, mistaken, log_prior) in enumerate(state.facts["histories"])
         ]
 
     def change_hardware(self) -> None:
         """Something may be different from now on; what is known of it stays as known."""
-        unchanged = [
-            replace(h, log_prior=h.log_prior + math.log(_NOTHING)) for h in self._histories
-        ]
+        something = math.log(0.5 * (1.0 - NOTHING))
+        unchanged = [h.then(math.log(NOTHING)) for h in self._histories]
         changed = [
-            replace(
-                h,
-                changes=(*h.changes, Change(self._now, shift_sd)),
-                log_prior=h.log_prior + math.log(0.5 * (1.0 - _NOTHING)),
-            )
+            h.then(something, Change(self._now, shift_sd))
             for h in self._histories
             for shift_sd in (0.0, self.config.shift_sd)
         ]
@@ -183,7 +171,7 @@ class DisplacedTrials:
         """Return the condition to try next; see `Adapter.propose`."""
         goal = self._normalisation.apply(goal_seen)
         condition = self._most_probable(goal)
-        missed = self._misses()
+        missed = self._memory.bare_misses(self._memory.aims)
         same = self._as_now(missed, goal) & np.all(missed.goals == goal, axis=1)
         tried = missed.only(same)
         if tried_again(condition[None], tried.conditions, tried.missed_by)[0]:
@@ -198,8 +186,8 @@ class DisplacedTrials:
         """
         learned = self._expected_to_land_on(goal, self._histories[0])
         conditions = np.array([learned, goal - self._prior.mean(goal[None])[:, 0]])
-        missed, places = self._misses(), self._places(conditions, goal)
-        told = self._memory.missed_by[np.any(self._memory.missed_by > 0.0, axis=1)]
+        missed, places = self._memory.bare_misses(self._memory.aims), self._places(conditions, goal)
+        told = self._memory.missed_by[self._memory.missed]
         radius = told[-1] if len(told) else np.full(len(goal), _NOMINAL)
         if len(missed.numbers) > 0:
             p_hit = self._p_hit_after(missed, places, radius)
@@ -258,7 +246,7 @@ class DisplacedTrials:
         radius = np.asarray(tolerance) / self._normalisation.scale
         at, targets = (self._normalisation.apply(values) for values in (conditions, goals))
         places = self._places(at, targets)
-        missed = self._misses()
+        missed = self._memory.bare_misses(self._memory.aims)
         if len(missed.numbers) > 0:
             return self._p_hit_after(missed, places, radius, seed=1)
         return self._p_hit(places, places.goals - places.conditions, radius)
@@ -270,41 +258,32 @@ class DisplacedTrials:
         numbers = np.full(len(conditions), self._now if number is None else number)
         return Places(conditions, numbers, np.broadcast_to(goal, conditions.shape))
 
-    @property
-    def _probabilities(self) -> Float[np.ndarray, " h"]:
-        """Of each history."""
+    def _weighed(self) -> Iterator[tuple[float, History]]:
+        """The probability of each history, and it."""
         logs = np.array([history.log_weight for history in self._histories])
         shares = np.exp(logs - logs.max())
-        return np.asarray(shares / shares.sum())
+        return zip((shares / shares.sum()).tolist(), self._histories, strict=True)
+
+    def _predicted(self, at: Places) -> Iterator[tuple[float, np.ndarray, np.ndarray, np.ndarray]]:
+        """Under each history: its probability, that of each model, mean and variance there."""
+        for probability, history in self._weighed():
+            share = history.posterior.model_weights
+            yield probability, share, *history.predict(self._prior, at, self._memory)
 
     def _p_hit(self, at: Places, aims: Points, radius: Point) -> Float[np.ndarray, " n"]:
         """Probability that the displacement at each condition hits its aim."""
         total, half_axes = np.zeros(len(at.numbers)), radius[:, None]
-        for probability, history in zip(self._probabilities, self._histories, strict=True):
-            mean, variance = history.predict(self._prior, at, self._memory)
-            share = history.posterior.model_weights
-            total += probability * share_within(
-                (mean - aims.T) / half_axes, np.sqrt(variance) / half_axes, share
-            )
+        for probability, share, mean, variance in self._predicted(at):
+            off, sd = (mean - aims.T) / half_axes, np.sqrt(variance) / half_axes
+            total += probability * share_within(off, sd, share)
         return total
-
-    def _misses(self) -> Memory:
-        """The latest trials that missed and of which their readings do not say so."""
-        missed = self._memory.only(slice(-LATEST, None))
-        missed = missed.only(np.any(missed.missed_by > 0.0, axis=1))
-        blur = _BLUR * np.sqrt(missed.variance)
-        beyond = np.maximum(missed.low - missed.aims, missed.aims - missed.high) - blur
-        least = np.linalg.norm(np.maximum(beyond, 0.0) / missed.missed_by, axis=1)
-        return missed.only(least < 1.0)
 
     def _expected(self, at: Places) -> tuple[Points, Points]:
         """Mean and variance of displacements over all that may be."""
         total, square = np.zeros((2, *at.conditions.shape))
-        for probability, history in zip(self._probabilities, self._histories, strict=True):
-            mean, variance = history.predict(self._prior, at, self._memory)
-            share = probability * history.posterior.model_weights
-            total += np.einsum("mk,mkp->pk", share, mean)
-            square += np.einsum("mk,mkp->pk", share, variance + mean**2)
+        for probability, share, mean, variance in self._predicted(at):
+            total += np.einsum("mk,mkp->pk", probability * share, mean)
+            square += np.einsum("mk,mkp->pk", probability * share, variance + mean**2)
         return total, square - total**2
 
     def _p_hit_after(
@@ -312,7 +291,7 @@ class DisplacedTrials:
     ) -> Float[np.ndarray, " n"]:
         """`_p_hit`, given that those missed; what was chosen is judged by other draws."""
         prior, memory, beliefs = self._prior, self._memory, []
-        for probability, history in zip(self._probabilities, self._histories, strict=True):
+        for probability, history in self._weighed():
             known = history.posterior
             to_missed = history.covariance(prior, missed, memory)[:, None]
             to_here = history.covariance(prior, at, memory)[:, None]

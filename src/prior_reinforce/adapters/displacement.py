@@ -146,7 +146,7 @@ class DisplacementPrior:
         covariance = self._square[:, None, None] * bent + (w_a * self._label) @ w_b.T
         covariance += self.noise[:, None, None] * (w_a @ w_b.T)
         if hardware:
-            covariance += self._hardware[:, None, None] * self._shared(a, b)
+            covariance += self._hardware[:, None, None] * rbf(a, b, self.config.hardware_reach)
         return np.asarray(covariance)
 
     def variance(
@@ -161,11 +161,7 @@ class DisplacementPrior:
 
     def of_change(self, a: Float[np.ndarray, "p k"], b: Points) -> Float[np.ndarray, "p n"]:
         """Covariance of what changed hardware adds: shift and stretch."""
-        return self.config.hardware_sd[1] ** 2 * self._shared(a, b)
-
-    def _shared(self, a: Float[np.ndarray, "p k"], b: Points) -> Float[np.ndarray, "p n"]:
-        square = np.square(a[:, None] - b[None]).sum(axis=-1)
-        return np.asarray(np.exp(-0.5 * square / self.config.hardware_reach**2))
+        return self.config.hardware_sd[1] ** 2 * rbf(a, b, self.config.hardware_reach)
 
     def _at(self, at: Float[np.ndarray, "p k"]) -> _AtPlaces:
         """S w, how much each demonstration counts, s (K(at, r) - w K(r, r) / 2), s, and the mean.
@@ -184,6 +180,15 @@ class DisplacementPrior:
         return self._asked[key]
 
     def _matern(self, a: Float[np.ndarray, "p k"], b: Points) -> Float[np.ndarray, "p n"]:
-        square = 5.0 * np.square(a[:, None] - b[None]).sum(axis=-1) / self.config.generator_reach**2
+        square = 5.0 * _squared(a, b) / self.config.generator_reach**2
         root = np.sqrt(square)
         return np.asarray((1.0 + root + square / 3.0) * np.exp(-root))
+
+
+def rbf(a: Float[np.ndarray, "p k"], b: Points, reach: float) -> Float[np.ndarray, "p n"]:
+    """Return exp(-d^2 / (2 reach^2)), d the distance from a to b."""
+    return np.asarray(np.exp(-0.5 * _squared(a, b) / reach**2))
+
+
+def _squared(a: Float[np.ndarray, "p k"], b: Points) -> Float[np.ndarray, "p n"]:
+    return np.asarray(np.square(a[:, None] - b[None]).sum(axis=-1))

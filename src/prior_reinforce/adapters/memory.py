@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from typing_extensions import Self
 
 from prior_reinforce.arrays import Point, Points
 
@@ -21,6 +22,9 @@ LATEST = 8
 """The latest trials, which are never forgotten, and whose misses count for themselves (ours)."""
 _KEPT = 64
 """Trials in memory before one is forgotten for each that comes (ours)."""
+_BLUR = 2.0
+"""Standard deviations of a reading within which it leaves a hit possible (ours): only then a miss
+says more than its reading, where words are coarse, or numbers noisy."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +36,10 @@ class Places:
     """Of the trials, from 0; -1 on the demonstrations' day."""
     goals: Points
     """What they are thrown at."""
+
+    def only(self, which: Bool[np.ndarray, " n"] | Int[np.ndarray, " m"] | slice) -> Self:
+        """Some of them."""
+        return type(self)(*(of[which] for of in vars(self).values()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,14 +63,28 @@ class Memory(Places):
         """Displacements that would have hit: goal minus condition."""
         return self.goals - self.conditions
 
+    @property
+    def missed(self) -> Bool[np.ndarray, " n"]:
+        """Which trials missed, by how much at least is known."""
+        return np.any(self.missed_by > 0.0, axis=1)
+
+    def bare_misses(self, hits: Points) -> Memory:
+        """The latest trials that missed and of which their readings do not say so.
+
+        Args:
+            hits: What would have been read of each trial, had it hit, shape (n, k).
+        """
+        which = np.flatnonzero(self.missed)
+        which = which[which >= len(self.numbers) - LATEST]
+        latest, hits = self.only(which), hits[which]
+        beyond = np.maximum(latest.low - hits, hits - latest.high)
+        beyond = np.maximum(beyond - _BLUR * np.sqrt(latest.variance), 0.0)
+        return latest.only(np.linalg.norm(beyond / latest.missed_by, axis=1) < 1.0)
+
     def followed_by(self, others: Memory) -> Memory:
         """The same and others after them."""
         pairs = zip(vars(self).values(), vars(others).values(), strict=True)
         return Memory(*(np.concatenate(pair) for pair in pairs))
-
-    def only(self, which: Bool[np.ndarray, " n"] | Int[np.ndarray, " m"] | slice) -> Memory:
-        """Some of them."""
-        return Memory(*(of[which] for of in vars(self).values()))
 
     def worth_keeping(self) -> Bool[np.ndarray, " n"]:
         """All, or all but one where they are too many: the older of the two closest together."""

@@ -26,20 +26,19 @@ Source: ours; sizes in reproduction/docs/decisions-adapter.md.
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, fields, replace
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.adapters.base import State
-from prior_reinforce.adapters.change_points import Change
+from prior_reinforce.adapters.change_points import NOTHING, Change, changes_of
 from prior_reinforce.adapters.expectation_propagation import Posterior, Readings, infer
 from prior_reinforce.adapters.memory import Memory, Places
 from prior_reinforce.adapters.moved_prior import NONE, Model, MovedPrior
-from prior_reinforce.adapters.p_hit import Targets
+from prior_reinforce.adapters.p_hit import Targets, standard_normal, weighed_hits
 from prior_reinforce.arrays import Point, Points
 from prior_reinforce.plans.motions import Demonstrations
 
@@ -83,7 +82,15 @@ class Hypothesis:
     at: Points
     """z, (n, k)."""
     jacobian: Float[np.ndarray, "n k k"]
-    """dr/dz there."""
+    """dr/dz there, r in what counts as 1 in readings (`UNIT`)."""
+
+    def changed(self, a: Places, b: Places, *, shifted: bool) -> Float[np.ndarray, "p n"]:
+        """How many changes, shifts or others, come before both of two places."""
+        both = np.zeros((len(a.numbers), len(b.numbers)))
+        for change in self.changes:
+            if bool(change.shift_sd) is shifted:
+                both += np.outer(change.concerns(a), change.concerns(b))
+        return both
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +105,11 @@ class Outcomes:
     cross: Float[np.ndarray, "p k q"]
     """Covariance of r with all latents that were read."""
 
+    def only(self, which: slice) -> Outcomes:
+        """Some of them."""
+        places, *others = vars(self).values()
+        return Outcomes(places.only(which), *(of[which] for of in others))
+
 
 class MovedBelief:
     """Hypotheses of moved plans, the most probable first, and what trials told of them."""
@@ -106,7 +118,7 @@ class MovedBelief:
         """Begin with what the demonstrations say."""
         self.prior = MovedPrior(demonstrations)
         self.symmetry, self.k = self.prior.symmetry, self.prior.symmetry.k
-        self._p_change = p_change
+        self._unit, self._p_change = UNIT * self.prior.size, p_change
         self.memory = Memory.empty(self.k)
         none = np.empty((0, self.k)), np.empty((0, self.k, self.k))
         self.hypotheses = [
@@ -123,8 +135,7 @@ class MovedBelief:
         return State(
             {
                 "hypotheses": [
-                    [h.model, [change.data() for change in h.changes], h.log_prior]
-                    for h in hypotheses
+                    [h.model, list(map(astuple, h.changes)), h.log_prior] for h in hypotheses
                 ],
                 "begun": list(self._begun),
             },
@@ -138,13 +149,13 @@ class MovedBelief:
 
     def resume(self, state: State) -> None:
         """Go on from what `state` gave."""
-        arrays, self._begun = state.arrays, tuple(state.facts["begun"])
-        self.memory = Memory(*(arrays[field.name] for field in fields(Memory)))
-        self._posterior = Posterior(*(arrays[field.name] for field in fields(Posterior)))
+        self._begun = tuple(state.facts["begun"])
+        self.memory, self._posterior = state.made(Memory), state.made(Posterior)
+        linearised = zip(state.arrays["at"], state.arrays["jacobian"], strict=True)
         self.hypotheses = [
-            Hypothesis(model, tuple(map(Change.of, changes)), log_prior, at, jacobian)
-            for (model, changes, log_prior), at, jacobian in zip(
-                state.facts["hypotheses"], arrays["at"], arrays["jacobian"], strict=True
+            Hypothesis(model, changes_of(changes), log_prior, at, jacobian)
+            for (model, changes, log_prior), (at, jacobian) in zip(
+                state.facts["hypotheses"], linearised, strict=True
             )
         ]
 
@@ -157,12 +168,16 @@ class MovedBelief:
         """Of a hypothesis."""
         return self.prior.models[self.hypotheses[h].model]
 
-    def change(self, number: int, nothing: float) -> None:
+    def change(self, number: int) -> None:
         """Something was changed before that trial or, with a small probability, nothing."""
-        alternatives = (None, nothing), (0.0, 0.5 - 0.5 * nothing), (1.0, 0.5 - 0.5 * nothing)
+        something = math.log(0.5 - 0.5 * NOTHING)
         self._branch(
-            (h, () if sd is None else (Change(number, sd),), math.log(p))
-            for sd, p in alternatives
+            (h, changes, log_p)
+            for changes, log_p in (
+                ((), math.log(NOTHING)),
+                ((Change(number, 0.0),), something),
+                ((Change(number, 1.0),), something),
+            )
             for h in range(len(self.hypotheses))
         )
 
@@ -228,13 +243,15 @@ class MovedBelief:
         return replace(
             hypothesis,
             at=np.vstack([hypothesis.at, at]),
-            jacobian=np.concatenate([hypothesis.jacobian, chart.jacobian(at)]),
+            jacobian=np.concatenate(
+                [hypothesis.jacobian, chart.jacobian(at) / self._unit[:, None]]
+            ),
         )
 
     def _inferred(self, known: Posterior | None) -> Posterior:
         """The posterior under all hypotheses, as one batch of models."""
         prior, memory, chart = self.prior, self.memory, self.symmetry.chart
-        unit, left, n = UNIT * prior.size, prior.left, len(memory.numbers)
+        unit, left, n = self._unit, prior.left, len(memory.numbers)
         w, s, many = prior.moved(memory.conditions), len(left), len(self.hypotheses)
         models = {h.model: prior.models[h.model] for h in self.hypotheses}
         means = {m: prior.mean(model, memory.conditions) for m, model in models.items()}
@@ -245,12 +262,8 @@ class MovedBelief:
         covariance, (low, high) = np.zeros((many, size, size)), np.empty((2, many, 1, size))
         for i, hypothesis in enumerate(self.hypotheses):
             model, m = models[hypothesis.model], hypothesis.model
-            jacobian = hypothesis.jacobian / unit[:, None]
-            signs, mean, gain = (
-                model.signs[left],
-                np.diag(model.mean)[left],
-                np.diag(model.sd)[left],
-            )
+            jacobian, signs = hypothesis.jacobian, model.signs[left]
+            mean, gain = np.diag(model.mean)[left], np.diag(model.sd)[left]
             low[i, 0, :s] = np.where(signs > 0, _LEAST_GAIN - mean, -np.inf)
             high[i, 0, :s] = np.where(signs > 0, np.inf, -_LEAST_GAIN - mean)
             to = np.einsum("ncj,nj->nc", jacobian, hypothesis.at - means[m])
@@ -264,8 +277,7 @@ class MovedBelief:
             covariance[i, s:, :s] = covariance[i, :s, s:].T
             of_z = among[m] + self._on_another_day(hypothesis, memory, memory)
             told = np.einsum("ncj,jnm,mdj->ncmd", jacobian, of_z, jacobian)
-            shifts = _shifts(hypothesis, memory, memory, _SHIFT * prior.size)
-            told += shifts / (unit[:, None, None] * unit)
+            told += self._shifts(hypothesis, memory, memory) / (unit[:, None, None] * unit)
             covariance[i, s:, s:] = told.reshape(n * self.k, n * self.k)
         variance = np.concatenate([np.full(s, _EXACTLY), (memory.variance / unit**2).ravel()])
         variance = np.broadcast_to(variance, low.shape)
@@ -278,33 +290,30 @@ class MovedBelief:
     ) -> Float[np.ndarray, "k p n"]:
         """Covariance that changed hardware adds, in the chart."""
         variance = np.square(_ANOTHER_DAY * self.symmetry.offset_sd)
-        total = np.zeros((len(a.numbers), len(b.numbers)))
-        for change in hypothesis.changes:
-            if not change.shift_sd:
-                total += np.outer(change.concerns(a), change.concerns(b))
-        return np.asarray(variance[:, None, None] * total)
+        return np.asarray(variance[:, None, None] * hypothesis.changed(a, b, shifted=False))
+
+    def _shifts(self, hypothesis: Hypothesis, a: Places, b: Places) -> Float[np.ndarray, "p k n k"]:
+        """Covariance of what shifts add to outcomes."""
+        variance, both = np.square(_SHIFT * self.prior.size), hypothesis.changed(a, b, shifted=True)
+        return np.asarray(both[:, None, :, None] * np.diag(variance)[None, :, None])
 
     def outcomes(self, h: int, places: Places) -> Outcomes:
         """Where plans for aims, the conditions of places, come down under a hypothesis."""
         prior, memory, hypothesis = self.prior, self.memory, self.hypotheses[h]
-        model, unit, left = self.model(h), UNIT * prior.size, prior.left
-        aims, p = places.conditions, len(places.numbers)
-        jacobian = hypothesis.jacobian / unit[:, None]
+        model, left, aims, p = self.model(h), prior.left, places.conditions, len(places.numbers)
         of_z = prior.covariance(model, aims, memory.conditions)
         of_z = of_z + self._on_another_day(hypothesis, places, memory)
-        to_z = np.einsum("jpn,ncj->pjnc", of_z, jacobian).reshape(
-            p, self.k, len(memory.numbers) * self.k
-        )
-        gain = np.zeros((p, self.k, len(left)))
-        gain[:, left, np.arange(len(left))] = (
-            prior.moved(aims)[:, left] * np.diag(model.sd)[left] ** 2
-        )
+        read = (p, self.k, len(memory.numbers) * self.k)
+        no_gain = np.zeros((p, self.k, len(left)))
+        shifts = (self._shifts(hypothesis, places, memory) / self._unit).reshape(read)
+        shifts = np.concatenate([no_gain, shifts], axis=2)
+        to_z = np.einsum("jpn,ncj->pjnc", of_z, hypothesis.jacobian).reshape(read)
+        gain = no_gain.copy()
+        of_gain = prior.moved(aims)[:, left] * np.diag(model.sd)[left] ** 2
+        gain[:, left, np.arange(len(left))] = of_gain
         to_z = np.concatenate([gain, to_z], axis=2)
         weights = self._posterior.weights[h, 0]
         z = prior.mean(model, aims) + to_z @ weights
-        shifts = _shifts(hypothesis, places, memory, _SHIFT * prior.size) / unit
-        shifts = shifts.reshape(p, self.k, len(memory.numbers) * self.k)
-        shifts = np.concatenate([np.zeros((p, self.k, len(left))), shifts], axis=2)
         at = self.symmetry.chart.jacobian(z)
         mean = self.symmetry.chart.back(z) + shifts @ weights
         return Outcomes(places, z, mean, at, at @ to_z + shifts)
@@ -315,24 +324,24 @@ class MovedBelief:
         of_z = self.prior.covariance(self.model(h), at.conditions, other.conditions)
         of_z = of_z + self._on_another_day(hypothesis, at, other)
         of_r = np.einsum("pcj,jpn,ndj->pcnd", a.jacobian, of_z, b.jacobian)
-        of_r += _shifts(hypothesis, at, other, _SHIFT * self.prior.size)
+        of_r += self._shifts(hypothesis, at, other)
         precision = self._posterior.precision[h, 0]
         return np.asarray(of_r - np.einsum("pcq,qr,ndr->pcnd", a.cross, precision, b.cross))
 
     def spread(self, h: int, at: Outcomes) -> Float[np.ndarray, "p k k"]:
         """Covariance of each outcome, likewise."""
-        each = [self.covariance(h, *2 * (_one(at, i),))[0, :, 0] for i in range(len(at.mean))]
+        single = [at.only(slice(i, i + 1)) for i in range(len(at.mean))]
+        each = [self.covariance(h, one, one)[0, :, 0] for one in single]
         return np.array(each).reshape(len(at.mean), self.k, self.k)
 
     def gain(self, h: int) -> Float[np.ndarray, "k k"]:
         """Expected G."""
         model, left = self.model(h), self.prior.left
-        jacobian = self.hypotheses[h].jacobian / (UNIT * self.prior.size)[:, None]
         w = self.prior.moved(self.memory.conditions)
-        weights = self._posterior.weights[h, 0]
-        of_trials = weights[len(left) :].reshape(len(w), self.k)
-        told = np.einsum("nc,ncj,nl->jl", of_trials, jacobian, w) * model.sd**2
-        told[left, left] += weights[: len(left)] * np.diag(model.sd)[left] ** 2
+        of_gain, of_trials = np.split(self._posterior.weights[h, 0], [len(left)])
+        of_trials = of_trials.reshape(len(w), self.k)
+        told = np.einsum("nc,ncj,nl->jl", of_trials, self.hypotheses[h].jacobian, w) * model.sd**2
+        told[left, left] += of_gain * np.diag(model.sd)[left] ** 2
         return np.asarray(model.mean + told)
 
     def aim(self, goal: Point, number: int, farthest: Point) -> Point:
@@ -406,45 +415,22 @@ class MovedBelief:
             onto = self.covariance(h, here, then).reshape(len(at.goals), self.k, n * self.k)
             onto = onto @ (vectors / np.sqrt(np.maximum(values, _EXACTLY * noise.min())))
             left = self.spread(h, here) + np.diag(noise) - onto @ np.swapaxes(onto, 1, 2)
-            normal = _normal((n + 1) * self.k, seed)
+            normal = standard_normal((_DRAWS, (n + 1) * self.k), seed)
             drawn = (then.mean - missed.goals).ravel() + normal[:, : n * self.k] @ root.T
             drawn = np.moveaxis(drawn.reshape(_DRAWS, n, self.k), 2, 0)
-            weight = 1.0 - (1.0 - _OUTLIER) * missed_by(missed).share_within(drawn)
-            weight = probabilities[h] * np.prod(weight, axis=1)
             values, vectors = np.linalg.eigh(left)
             own = vectors * np.sqrt(np.maximum(values, 0.0))[:, None]
             outcome = np.einsum("qi,pci->cqp", normal[:, : n * self.k], onto)
             outcome = outcome + np.einsum("qi,pci->cqp", normal[:, n * self.k :], own)
             outcome = outcome + (here.mean - at.goals).T[:, None]
             size = np.broadcast_to(radius, at.goals.shape)
-            hits += weight @ Targets(np.zeros_like(at.goals), size).share_within(outcome)
-            total += weight.sum()
+            lost, wanted = _around(missed.missed_by), _around(size)
+            hit, weight = weighed_hits(drawn, lost, outcome, wanted, _OUTLIER)
+            hits += probabilities[h] * hit
+            total += probabilities[h] * weight
         return np.asarray(hits / total)
 
 
-def missed_by(trials: Memory) -> Targets:
-    """What they missed, seen from their goals."""
-    return Targets(np.zeros_like(trials.goals), trials.missed_by)
-
-
-@functools.lru_cache
-def _normal(size: int, seed: int) -> Float[np.ndarray, "q s"]:
-    """The same draws for every call, so that a proposal depends on what was observed alone."""
-    return np.random.default_rng(seed).standard_normal((_DRAWS, size))
-
-
-def _shifts(
-    hypothesis: Hypothesis, a: Places, b: Places, sd: Point
-) -> Float[np.ndarray, "p k n k"]:
-    """Covariance of what shifts add to outcomes."""
-    both = np.zeros((len(a.numbers), len(b.numbers)))
-    for change in hypothesis.changes:
-        if change.shift_sd:
-            both += np.outer(change.concerns(a), change.concerns(b))
-    return np.asarray(both[:, None, :, None] * np.diag(sd**2)[None, :, None])
-
-
-def _one(at: Outcomes, i: int) -> Outcomes:
-    one = slice(i, i + 1)
-    places = Places(at.places.conditions[one], at.places.numbers[one], at.places.goals[one])
-    return Outcomes(places, at.z[one], at.mean[one], at.jacobian[one], at.cross[one])
+def _around(radii: Points) -> Targets:
+    """What errors are to be within, seen from their goals."""
+    return Targets(np.zeros_like(radii), radii)

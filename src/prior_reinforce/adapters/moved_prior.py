@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from prior_reinforce.adapters.displacement import rbf
 from prior_reinforce.arrays import Point, Points
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.symmetry import Anchors
@@ -115,12 +116,12 @@ class MovedPrior:
         w_a, w_b = a - base_a, b - base_b
         counts = ~of.exact if len(self.left) else np.ones(of.k, dtype=bool)
         lengths = np.outer(*(np.linalg.norm(w * counts, axis=1) for w in (w_a, w_b)))
-        bent = lengths * _kernel(w_a * counts, w_b * counts)
+        bent = lengths * rbf(w_a * counts, w_b * counts, _REACH)
         between = np.zeros_like(bent)
         if self.anchors.mixed:
             at_a, at_b, known = (z[:, self.left] for z in (base_a, base_b, self.anchors.z))
-            between = _kernel(at_a, at_b) + v_a @ _kernel(known, known) @ v_b.T
-            between -= _kernel(at_a, known) @ v_b.T + v_a @ _kernel(known, at_b)
+            between = rbf(at_a, at_b, _REACH) + v_a @ rbf(known, known, _REACH) @ v_b.T
+            between -= rbf(at_a, known, _REACH) @ v_b.T + v_a @ rbf(known, at_b, _REACH)
         common = v_a @ v_b.T
         return np.stack(
             [
@@ -132,8 +133,3 @@ class MovedPrior:
                 for j in range(of.k)
             ]
         )
-
-
-def _kernel(a: Float[np.ndarray, "p k"], b: Points) -> Float[np.ndarray, "p n"]:
-    square = np.square(a[:, None] - b[None]).sum(axis=-1)
-    return np.asarray(np.exp(-0.5 * square / _REACH**2))

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from prior_reinforce.adapters.base import Expectation, State
 from prior_reinforce.adapters.displacement import BayesianConfig
-from prior_reinforce.adapters.memory import LATEST, Memory, Places, tried_again, untried_around
+from prior_reinforce.adapters.memory import Memory, Places, tried_again, untried_around
 from prior_reinforce.adapters.moved import EXECUTION, OF_TOLERANCE, UNIT, MovedBelief
 from prior_reinforce.adapters.moved_prior import AS_STATED, OTHER_WAY
 from prior_reinforce.adapters.p_hit import trials_to_go
@@ -19,12 +19,6 @@ from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.symmetry import LogDistance, Polar
 from prior_reinforce.readings import Reading
 
-_NOTHING = 0.1
-"""Probability that nothing has changed although it was said (ours)."""
-_BLUR = 2.0
-"""Standard deviations of a reading within which it leaves a hit possible (ours)."""
-_NOMINAL = 0.1
-"""Tolerance where no trial told one, in `UNIT` (ours)."""
 _BACK = 0.5
 """What is left of the way from the demonstration where an object was lost (ours)."""
 
@@ -78,7 +72,7 @@ class MovedTrials:
 
     def change_hardware(self) -> None:
         """Something may be different from now on."""
-        self.belief.change(self.now, _NOTHING)
+        self.belief.change(self.now)
         self._lost.clear()
 
     def propose(self, goal: Point) -> Point:
@@ -113,7 +107,8 @@ class MovedTrials:
     ) -> Float[np.ndarray, " n"]:
         """Return each condition's probability of a hit; see `BayesianAdapter.p_hit`."""
         at, radius = self._places(conditions, goals), np.broadcast_to(tolerance, goals.shape[1])
-        return self.belief.p_hit(at, radius, self._bare_misses(), seed)
+        memory = self.belief.memory
+        return self.belief.p_hit(at, radius, memory.bare_misses(np.zeros_like(memory.goals)), seed)
 
     def displacement(self, conditions: Points, *, hardware: bool = True) -> Points:
         """Where outcomes are expected to lie, seen from conditions, most probably; (n, k).
@@ -186,15 +181,25 @@ class MovedTrials:
     @property
     def _noise(self) -> Point:
         """Standard deviation of an execution, in the outcomes' units."""
-        told = self.belief.memory.missed_by[np.any(self.belief.memory.missed_by > 0.0, axis=1)]
+        told = self.belief.memory.missed_by[self.belief.memory.missed]
         if len(told):
             return np.asarray(OF_TOLERANCE * told[-1])
         return np.asarray(EXECUTION * UNIT * self.belief.prior.size)
 
     def _aim(self, goal: Point, losses: list[tuple[Point, Points]]) -> Point:
-        """Return the aim for a goal, in the chart."""
+        """Return the aim for a goal, in the chart, half-way back from what lost an object.
+
+        By what no move changes (`Symmetry.learned`) plans are not moved: there the aim itself keeps
+        nearer to a demonstration.
+        """
         aim = self.belief.aim(goal, self.now, self._farthest(losses))
-        return self._held_back(aim, losses)
+        learned, z = self.belief.symmetry.learned, self.belief.prior.anchors.z
+        for lost, read in losses:
+            apart = (z - lost)[:, learned] / np.ptp(z, axis=0)[learned]
+            nearest = z[np.argmin(np.square(apart).sum(axis=1))]
+            way = _half_way(lost - nearest, read - nearest)
+            aim = np.where(learned, nearest + np.clip(aim - nearest, -way, way), aim)
+        return aim
 
     def _losses(self, goal: Point) -> list[tuple[Point, Points]]:
         """Aims for a goal that lost an object, each with the aims for that goal that were read.
@@ -212,29 +217,13 @@ class MovedTrials:
 
     def _farthest(self, losses: list[tuple[Point, Points]]) -> Point:
         """By how much plans may be moved: by the symmetry, and half-way to what lost an object."""
-        symmetry, left, moved = (
-            self.belief.symmetry,
-            self.belief.prior.left,
-            self.belief.prior.moved,
-        )
+        symmetry, prior = self.belief.symmetry, self.belief.prior
         farthest = np.where(symmetry.learned, 0.0, symmetry.farthest)
-        which = left if len(left) else np.arange(symmetry.k)
+        which = prior.left if len(prior.left) else np.arange(symmetry.k)
         for lost, read in losses:
-            within = np.abs(moved(read)).max(axis=0, initial=0.0)
-            way = within + _BACK * np.maximum(np.abs(moved(lost[None])[0]) - within, 0.0)
+            way = _half_way(prior.moved(lost[None])[0], prior.moved(read))
             farthest[which] = np.minimum(farthest, way)[which]
         return farthest
-
-    def _held_back(self, aim: Point, losses: list[tuple[Point, Points]]) -> Point:
-        """Nearer to a demonstration than where an object was lost, in what is learned."""
-        learned, z = self.belief.symmetry.learned, self.belief.prior.anchors.z
-        for lost, read in losses:
-            apart = (z - lost)[:, learned] / np.ptp(z, axis=0)[learned]
-            nearest = z[np.argmin(np.square(apart).sum(axis=1))]
-            within = np.abs(read - nearest).max(axis=0, initial=0.0)
-            way = within + _BACK * np.maximum(np.abs(lost - nearest) - within, 0.0)
-            aim = np.where(learned, nearest + np.clip(aim - nearest, -way, way), aim)
-        return aim
 
     def _places(self, conditions: Points, goals: Points) -> Places:
         """Of trials of now."""
@@ -244,16 +233,8 @@ class MovedTrials:
         """Trials for a goal that missed, with all as it is now, most probably."""
         memory, changes = self.belief.memory, self.belief.hypotheses[0].changes
         since = changes[-1].since if changes else 0
-        missed = np.all(memory.goals == goal, axis=1) & np.any(memory.missed_by > 0.0, axis=1)
-        return memory.only(missed & (memory.numbers >= since))
-
-    def _bare_misses(self) -> Memory:
-        """The latest trials that missed and of which their readings do not say so."""
-        missed = self.belief.memory.only(slice(-LATEST, None))
-        missed = missed.only(np.any(missed.missed_by > 0.0, axis=1))
-        beyond = np.maximum(missed.low, -missed.high) - _BLUR * np.sqrt(missed.variance)
-        least = np.linalg.norm(np.maximum(beyond, 0.0) / missed.missed_by, axis=1)
-        return missed.only(least < 1.0)
+        of_goal = np.all(memory.goals == goal, axis=1) & memory.missed
+        return memory.only(of_goal & (memory.numbers >= since))
 
     def _likeliest_beside(self, condition: Point, goal: Point, missed: Memory) -> Point:
         """Return the condition around another that most probably hits and was not tried."""
@@ -264,3 +245,9 @@ class MovedTrials:
         candidates = untried_around(condition, radius + 2.0 * sd, tried, missed.missed_by)
         goals = np.broadcast_to(goal, candidates.shape)
         return np.asarray(candidates[np.argmax(self.p_hit(candidates, goals, radius, seed=0))])
+
+
+def _half_way(lost: Point, read: Points) -> Point:
+    """How far to go where an object was lost: as far as was read, and half of what is left."""
+    within = np.abs(read).max(axis=0, initial=0.0)
+    return np.asarray(within + _BACK * np.maximum(np.abs(lost) - within, 0.0))

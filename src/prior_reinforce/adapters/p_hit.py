@@ -111,7 +111,7 @@ def p_hit_after(
     most = int(np.clip(_EVALUATED // n, *_DRAWS))
     for belief in beliefs:
         draws = max(_FEWEST, math.ceil(most * belief.probability))
-        normal = _normal(k, len(missed.aims) + 1, seed)[:, :draws]
+        normal = standard_normal((k, _DRAWS[1] + 1, len(missed.aims) + 1), seed)[:, :draws]
         of_missed = np.empty((k, draws, len(missed.aims)))
         of_candidates = np.empty((k, draws, n))
         for j in range(k):
@@ -127,11 +127,31 @@ def p_hit_after(
                 of_candidates[j, at] = (
                     belief.mean[m, j] + drawn[:, :-1] @ onto + drawn[:, -1:] * np.sqrt(left)
                 )
-        weight = np.prod(1.0 - (1.0 - outlier) * missed.share_within(of_missed), axis=1)
+        hit, weight = weighed_hits(of_missed, missed, of_candidates, candidates, outlier)
         share = belief.probability / draws
-        hits += share * (weight @ candidates.share_within(of_candidates))
-        total += share * weight.sum()
+        hits += share * hit
+        total += share * weight
     return np.asarray(hits / total)
+
+
+def weighed_hits(
+    drawn_missed: Float[np.ndarray, "k q M"],
+    missed: Targets,
+    drawn: Float[np.ndarray, "k q n"],
+    candidates: Targets,
+    outlier: float,
+) -> tuple[Float[np.ndarray, " n"], float]:
+    """Return the sums over draws of w_q P(hit | draw q), for each candidate, and of w_q.
+
+    Args:
+        drawn_missed: What M trials that missed would do, in q draws.
+        missed: What they missed.
+        drawn: What n candidates would do, in the same draws.
+        candidates: What these are to hit.
+        outlier: e, probability that a miss says nothing.
+    """
+    weight = np.prod(1.0 - (1.0 - outlier) * missed.share_within(drawn_missed), axis=1)
+    return weight @ candidates.share_within(drawn), float(weight.sum())
 
 
 def share_within(
@@ -167,9 +187,9 @@ def share_within(
 
 
 @functools.lru_cache
-def _normal(k: int, size: int, seed: int) -> Float[np.ndarray, "k q s"]:
+def standard_normal(shape: tuple[int, ...], seed: int) -> Float[np.ndarray, "..."]:
     """The same draws for every call, so that a proposal depends on what was observed alone."""
-    return np.random.default_rng(seed).standard_normal((k, _DRAWS[1] + 1, size))
+    return np.random.default_rng(seed).standard_normal(shape)
 
 
 def _shared_out(share: Float[np.ndarray, " m"], draws: int, seed: int) -> Int[np.ndarray, " q"]:
@@ -181,6 +201,6 @@ def _shared_out(share: Float[np.ndarray, " m"], draws: int, seed: int) -> Int[np
 def trials_to_go(p_hit: float, told: Memory) -> float:
     """Trials that are expected to the next hit, that one included, after those that were told."""
     last = told.only(slice(-1, None))
-    if np.any(last.missed_by > 0.0) and np.all(np.isinf(last.high - last.low)):
+    if np.any(last.missed) and np.all(np.isinf(last.high - last.low)):
         return 1.0 / max(p_hit, _LEAST_P_HIT)
     return 1.0 + _TRIALS_AFTER_A_MISS * (1.0 - p_hit)
