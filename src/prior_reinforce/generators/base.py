@@ -291,12 +291,7 @@ class Wrapper(Generator):
             raise FileFormatError(
                 f"a {cls.name} generator is rebuilt around another; learn it again"
             )
-        wrapper = cls(generator)
-        wrapper.restore(settings, tensors)
-        return wrapper
-
-    def restore(self, settings: Mapping[str, Any], tensors: Tensors) -> None:
-        """Take up what `state` gave, if it is more than nothing."""
+        return cls(generator)
 
 
 def at_once(progress: OnProgress, loss: float) -> None:

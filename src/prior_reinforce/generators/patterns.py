@@ -15,6 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float, Int
 
+from prior_reinforce.arrays import check_spread
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.generators.timing.registration import best_correlations
 from prior_reinforce.generators.timing.timeline import decompose
@@ -131,19 +132,14 @@ def _ways(
 
 def _left_out(motions: _Motions, outcomes: Float[np.ndarray, "N k"]) -> float:
     """Squared error of motions that are interpolated from the others; inf where that cannot be."""
-    n = len(motions)
-    if n < 2 or not all(_spread(np.delete(outcomes, i, axis=0)) for i in range(n)):
+    if len(motions) < 2:
+        return float("inf")
+    try:
+        for i in range(len(motions)):
+            check_spread(np.delete(outcomes, i, axis=0))
+    except InvalidDemonstrationsError:
         return float("inf")
     return float(np.sum(left_out_errors(outcomes, motions) ** 2))
-
-
-def _spread(outcomes: Float[np.ndarray, "N k"]) -> bool:
-    """Whether every component varies, and enough outcomes for an affine function lie on no line."""
-    n, k = outcomes.shape
-    extent = np.ptp(outcomes, axis=0)
-    if np.any(extent == 0.0):
-        return False
-    return n <= k or bool(np.linalg.matrix_rank((outcomes - outcomes[0]) / extent) == k)
 
 
 def _explained(motions: _Motions, outcomes: Float[np.ndarray, "N k"]) -> bool:

@@ -19,10 +19,12 @@ which slows it: a throw 0.1 s too early and one 0.1 s too late average to one th
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Any, ClassVar, Literal, get_args
 
+import msgspec
 import numpy as np
+from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans, Points
 from prior_reinforce.errors import ConfigurationError
@@ -73,14 +75,18 @@ class Timed(Wrapper):
 
     def state(self) -> tuple[dict[str, Any], Tensors]:
         """The common phase; see `Generator.state`."""
-        timeline = None if self.timeline is None else self.timeline.settings()
+        timeline = None if self.timeline is None else asdict(self.timeline)
         return {"timing": self.timing, "timeline": timeline}, {}
 
-    def restore(self, settings: Mapping[str, Any], tensors: Tensors) -> None:
-        """Take up the common phase; see `Wrapper.restore`."""
-        self.timing = settings["timing"]
-        if settings["timeline"] is not None:
-            self.timeline = Timeline.restore(settings["timeline"])
+    @classmethod
+    def from_state(
+        cls, settings: Mapping[str, Any], tensors: Tensors, generator: Generator | None = None
+    ) -> Self:
+        """Take up the common phase; see `Generator.from_state`."""
+        made = super().from_state(settings, tensors, generator)
+        made.timing = settings["timing"]
+        made.timeline = msgspec.convert(settings["timeline"], Timeline | None)
+        return made
 
     def _decomposed(self, demonstrations: Demonstrations) -> Decomposition:
         if self.timing == "auto":

@@ -19,11 +19,9 @@ Source: ours; separating phase from amplitude is functional data analysis [Sriva
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
-import msgspec
 import numpy as np
 from jaxtyping import Bool, Float
 
@@ -159,19 +157,6 @@ class Timeline:
         numbers = _unused([*warp, *events], names)
         of_numbers = *("frame", "log")[: len(warp)], *["frame"] * len(events)
         return (*names, *numbers), (*units, *of_numbers)
-
-    def settings(self) -> dict[str, Any]:
-        """Everything as JSON types."""
-        return asdict(self)
-
-    @classmethod
-    def restore(cls, settings: Any) -> Timeline:
-        """Rebuild it from `settings`.
-
-        Raises:
-            ValueError: Something is missing, or does not fit.
-        """
-        return msgspec.convert(settings, cls)
 
     def _split(self, numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
         """The numbers of warps, and those of events."""
