@@ -135,13 +135,14 @@ def table_of_outcomes(
 
 def _has_a_row_each(table: Table, episodes: Sequence[str]) -> bool:
     """Whether each row is of another episode, as in a table of outcomes."""
+    if not 1 < len(table) <= len(episodes):  # a recording's cells are not looked through for it
+        return False
     lower = [name.lower() for name in table.names]
     key = next((i for i, name in enumerate(lower) if name in ROW_COLUMNS), None)
     if key is None and table.named and table.is_text(0):
         called = {Path(cell).stem for cell in table.cells[0]}
         key = 0 if called.intersection(episodes) else None
-    rows = len(table)
-    return key is not None and 1 < rows == len({*table.cells[key]}) and rows <= len(episodes)
+    return key is not None and len(table) == len({*table.cells[key]})
 
 
 def _throws(
@@ -407,8 +408,10 @@ def _of_echo(table: Table) -> Table:
     A row is the stamp in s and ns, the frame's name (column 3, which is no column where it is
     empty), the joints' names, and as many positions; then velocities and efforts, if there are any.
     """
+    if table.named:
+        return table
     texts = [i for i, cells in enumerate(table.cells) if any(map(_is_word, cells))]
-    if table.named or not texts or texts != [*range(2, texts[-1] + 1)]:
+    if not texts or texts != [*range(2, texts[-1] + 1)]:
         return table
     stamps = table.values[:, :2]
     if np.any(stamps != np.floor(stamps)) or np.any(stamps < 0) or np.any(stamps[:, 1] >= _SECOND):
