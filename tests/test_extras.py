@@ -88,26 +88,32 @@ def test_an_extra_has_the_library_that_it_is_named_for(library):
     assert installed_as in {Requirement(line).name.replace("-", "_") for line in lines}
 
 
-@pytest.mark.parametrize("kind", ["csv", "lerobot", "mcap"])
-def test_recordings_become_a_told_trial_and_a_report_without_any_other_extra(kind, tmp_path):
-    lab = tmp_path / "lab"
-    lab.mkdir()
-    if kind == "mcap":
-        recorded.write_bags(lab, kind="mcap", count=recorded.N)
-        outcomes = {f"throw{i}": place for i, place in enumerate(recorded.OUTCOMES.values())}
-        recorded.write_outcomes(lab, outcomes)
-    else:
-        {"csv": recorded.write_csv, "lerobot": recorded.write_lerobot}[kind](lab)
-        recorded.write_outcomes(lab)
+def test_recordings_become_a_told_trial_and_a_report_without_any_other_extra(tmp_path):
+    """They are learned from whatever kind they are; what comes next knows nothing of the kind."""
+    for kind in ("csv", "lerobot", "mcap"):
+        (tmp_path / kind).mkdir()
+    outcomes = {f"throw{i}": place for i, place in enumerate(recorded.OUTCOMES.values())}
+    recorded.write_csv(tmp_path / "csv")
+    recorded.write_lerobot(tmp_path / "lerobot")
+    recorded.write_bags(tmp_path / "mcap", kind="mcap", count=recorded.N)
+    recorded.write_outcomes(tmp_path / "csv")
+    recorded.write_outcomes(tmp_path / "lerobot")
+    recorded.write_outcomes(tmp_path / "mcap", outcomes)
     commands = [
-        ["new", "hoop", "--robot", "panda"],
-        ["import", "hoop", "lab"],
-        ["learn", "hoop"],
-        ["goal", "hoop", "0.92", "0.03"],
-        ["ask", "hoop", "--out", "plan.npz"],
-        ["tell", "hoop", "1", "--error", "5cm long, 2cm left"],
-        ["status", "hoop"],
-        ["report", "hoop"],
+        words
+        for kind in ("csv", "lerobot", "mcap")
+        for words in (
+            ["new", f"hoop-{kind}", "--robot", "panda"],
+            ["import", f"hoop-{kind}", kind],
+            ["learn", f"hoop-{kind}"],
+        )
+    ]
+    commands += [
+        ["goal", "hoop-csv", "0.92", "0.03"],
+        ["ask", "hoop-csv", "--out", "plan.npz"],
+        ["tell", "hoop-csv", "1", "--error", "5cm long, 2cm left"],
+        ["status", "hoop-csv"],
+        ["report", "hoop-csv"],
     ]
     code = """
 from prior_reinforce.cli import main
@@ -117,7 +123,7 @@ for words in json.loads(sys.argv[2]):
     status, out, err = light(code, json.dumps(commands), cwd=tmp_path)
     assert status == 0, out + err
     assert (tmp_path / "plan.npz").is_file()
-    assert list((tmp_path / "hoop").rglob("report.html"))
+    assert list((tmp_path / "hoop-csv").rglob("report.html"))
 
 
 def test_all_commands_are_listed_without_any_extra(tmp_path):
