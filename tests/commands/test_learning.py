@@ -20,8 +20,11 @@ def learn(choice, frames=140):
     return make_generator(choice).fit(cut, seed=0)
 
 
-@pytest.mark.parametrize("generator", [f"diffusion,{TINY}", "interpolation"])
-@pytest.mark.parametrize("frames", [140, 80], ids=["rest to rest", "cut off in mid-swing"])
+@pytest.mark.parametrize(
+    ("generator", "frames"),
+    [(f"diffusion,{TINY}", 80), ("interpolation", 140)],
+    ids=["cut off in mid-swing", "rest to rest"],
+)
 def test_the_timing_that_was_chosen_is_told_in_a_line_and_kept(generator, frames):
     model = learn(generator, frames)
     assert model.remarks[0].startswith(

@@ -524,9 +524,7 @@ def test_an_arm_that_checks_its_range_alone_has_not_checked_its_limits(run, arm,
     assert "NOT checked: self-collision, the arm's limits, the table. " in asked
 
 
-@pytest.mark.parametrize("answers", [["yes", "no"], ["yes", "yes", "yes"], ["yes", "yes", "no"]])
-def test_each_motion_is_confirmed_and_none_is_made_unasked(run, arm, folder, person, answers):
-    """And the yes to the slow way to the start is none to the throw."""
+def test_an_arm_that_stands_elsewhere_is_not_moved_there_unasked(run, arm, folder):
     toy = arm()
     (toy / "pose").write_text("0.0 0.3")
     status, _, err = run("ask", folder, "--yes", "--execute")
@@ -536,7 +534,13 @@ def test_each_motion_is_confirmed_and_none_is_made_unasked(run, arm, folder, per
         "--approach" in err
     )
     assert toy_arm.motions(toy) == 0
-    asked = person(*answers).asked
+
+
+@pytest.mark.parametrize("answers", [["yes", "no"], ["yes", "yes", "yes"], ["yes", "yes", "no"]])
+def test_each_motion_is_confirmed_and_none_is_made_unasked(run, arm, folder, person, answers):
+    """And the yes to the slow way to the start is none to the throw."""
+    toy, asked = arm(), person(*answers).asked
+    (toy / "pose").write_text("0.0 0.3")
     status, out, err = run("ask", folder, "--approach", "--execute")
     assert status == 1, (out, err)
     assert "nothing moved; run ask again when the area is clear" in out
@@ -570,15 +574,16 @@ def test_a_stop_between_two_motions_lets_no_other_begin(
 
 
 @pytest.mark.parametrize(
-    ("speed", "answer", "moves"),
-    [("0.2", "yes", 1), ("0.9", "yes", 0), ("0.9", "throw 1", 0), ("0.9", "rehearse 1", 1)],
+    ("speed", "answers", "moves"),
+    [("0.2", ["yes"], 1), ("0.9", ["yes", "throw 1"], 0), ("0.9", ["rehearse 1"], 1)],
 )
 def test_a_rehearsal_that_is_not_slow_is_no_plain_yes(
-    run, arm, folder, person, speed, answer, moves
+    run, arm, folder, person, speed, answers, moves
 ):
-    toy, asked = arm(), person(answer, "no").asked
+    toy, asked = arm(), person(*answers).asked
     assert run("ask", folder, "--rehearse", speed, "--execute")[0] == (not moves)
     assert f"Trial 1 will be rehearsed at {float(speed):.0%}".replace("%", " %") in asked[0]
+    assert len(asked) == len(answers)
     assert toy_arm.motions(toy) == moves
 
 
