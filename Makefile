@@ -95,9 +95,10 @@ $(VENV)/.lerobot: lerobot.txt | $(BIN)/python
 	chmod +x $(VENV)/lerobot/python
 	touch $@
 
-$(VENV)/.lowest: pyproject.toml $(VENV)/.all
+$(VENV)/.lowest: pyproject.toml | $(BIN)/python
 	rm -rf $(VENV)/lowest && $(PYTHON) -m venv $(VENV)/lowest
-	$(BIN)/python -m tests.lowest > $(VENV)/lowest/pins.txt
+	$(VENV)/lowest/bin/python -m pip install --quiet --disable-pip-version-check packaging 'tomli; python_version < "3.11"'
+	$(VENV)/lowest/bin/python -m tests.lowest > $(VENV)/lowest/pins.txt
 	$(VENV)/lowest/bin/python -m pip install --quiet --disable-pip-version-check -r $(VENV)/lowest/pins.txt mujoco joblib threadpoolctl 'pytest>=9' hypothesis beartype 'pandas>=2.1' scikit-learn packaging httpx
 	touch $@
 
