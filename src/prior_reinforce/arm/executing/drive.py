@@ -50,6 +50,7 @@ from prior_reinforce.errors import (
     RobotLimitError,
 )
 from prior_reinforce.extras import missing_extra
+from prior_reinforce.plans.interpolation import minimum_jerk
 from prior_reinforce.plans.motions import Plan
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.registry import build
@@ -196,7 +197,7 @@ def approach(
         duration = max(duration, 15 / 8 * float(distance) / (speed or 1.0))
     n = math.ceil(duration / _APPROACH_DT)
     s = np.arange(n + 1)[:, None] / n
-    frames = pose + (10 * s**3 - 15 * s**4 + 6 * s**5) * (first - pose)
+    frames = pose + minimum_jerk(s) * (first - pose)
     return Plan(frames, PlanFormat(arm.columns, arm.units, _APPROACH_DT))
 
 
