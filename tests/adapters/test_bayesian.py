@@ -451,6 +451,15 @@ def test_a_miss_makes_the_same_throw_less_probable():
     assert expected.trials == pytest.approx(1 / expected.p_hit)  # such trials teach little
     adapter.observe(GOAL, GOAL, Reading.by_eye([0.02, 0.0], hit=False))
     assert adapter.expect(GOAL, GOAL, TOLERANCE).trials < 2.3
+    adapter.observe(GOAL, GOAL, Reading.only(False, 2).within(np.full(2, TOLERANCE)))
+    assert adapter.expect(GOAL, GOAL, TOLERANCE).trials < 2.3  # the reading before still teaches
+
+
+def test_how_many_trials_a_hopeless_goal_takes_is_not_said():
+    adapter = started(noise=np.full((6, 2), 0.02))
+    expected = adapter.expect(GOAL, GOAL + 3.0, TOLERANCE)
+    assert expected.p_hit < 0.01
+    assert expected.trials is None
 
 
 def test_a_miss_that_was_said_in_words_changes_nothing():

@@ -42,6 +42,13 @@ def test_what_went_wrong_with_an_execution_is_said_beside_what_was_seen():
     assert row.seen == "5 cm long; but aborted: the command ended with status 1"
 
 
+def test_how_many_trials_are_to_go_is_left_out_where_nobody_knows():
+    told = record([0.05, 0.0])
+    trial = replace(told.trials[0], p_hit=1e-3)
+    (row,) = trial_rows(replace(told, trials=(trial,)))
+    assert row.expected == "unlikely"
+
+
 def test_the_headline_counts_as_the_paper_does():
     said = headline([REACHED_IN_1, REACHED_IN_2])
     assert (said.text, said.count) == ("2 of 2 goals reached", "N = 6 + 1.5 trials")

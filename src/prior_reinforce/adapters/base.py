@@ -30,8 +30,8 @@ class Expectation:
 
     p_hit: float
     """Probability that it reaches the goal."""
-    trials: float
-    """Trials until the goal is reached, this one included."""
+    trials: float | None
+    """Trials until the goal is reached, this one included; None if nobody knows."""
     error: Point | None = None
     """Expected error, outcome minus goal, shape (k,), in the outcomes' units; None if unknown."""
     sd: Point | None = None

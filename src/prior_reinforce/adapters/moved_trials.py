@@ -86,7 +86,6 @@ class MovedTrials:
     def expect(self, condition: Point, goal: Point, tolerance: Point) -> Expectation:
         """Return what is expected of a trial; see `Adapter.expect`."""
         p_hit = float(self.p_hit(condition[None], goal[None], tolerance)[0])
-        trials = trials_to_go(p_hit, self.belief.memory)
         at = self._places(condition[None], goal[None])
         means, variances = [], []
         for h in range(len(self.belief.hypotheses)):
@@ -100,6 +99,7 @@ class MovedTrials:
         losses = self._losses(goal)
         nearer = bool(losses) and not np.allclose(self._aim(goal, losses), self._aim(goal, []))
         beyond = bool(self._beyond(goal))
+        trials = None if beyond else trials_to_go(p_hit, self.belief.memory)
         return Expectation(p_hit, trials, error, sd, self.remark(goal), nearer, beyond)
 
     def p_hit(
@@ -155,7 +155,7 @@ class MovedTrials:
         if beyond := self._beyond(goal):
             return (
                 f"the goal is {beyond} than the demonstration can be moved ({symmetry.name}); "
-                f"demonstrate nearer to {np.round(goal, 3).tolist()}"
+                "demonstrate nearer to it"
             )
         if model.name == OTHER_WAY:
             return f"outcomes follow the symmetry ({symmetry.name}) the other way round"

@@ -33,8 +33,9 @@ from prior_reinforce.adapters.memory import Memory
 _TRIALS_AFTER_A_MISS = 1.24
 """Fitted to 1623 trials of tuning material (ours; reproduction/docs/decisions-adapter.md)."""
 _LEAST_P_HIT = 0.01
-"""Where "a miss" was all that was told, 1 / P(hit) trials are expected, a hundred at most (ours):
-such a trial teaches little. That is still too few: 8 to 13 where 14 were needed (tuning fields)."""
+"""Below, nobody knows how many trials it takes (ours). Where "a miss" was all that was told,
+1 / P(hit) are expected: such a trial teaches little. That is still too few: 8 to 13 where 14 were
+needed (tuning fields)."""
 _CELLS = 64
 """Into which a ball is cut along all components but the last, at most (ours)."""
 _ALL_CELLS = 32768
@@ -198,9 +199,15 @@ def _shared_out(share: Float[np.ndarray, " m"], draws: int, seed: int) -> Int[np
     return np.minimum(np.searchsorted(np.cumsum(share), evenly), len(share) - 1)
 
 
-def trials_to_go(p_hit: float, told: Memory) -> float:
-    """Trials that are expected to the next hit, that one included, after those that were told."""
-    last = told.only(slice(-1, None))
-    if np.any(last.missed) and np.all(np.isinf(last.high - last.low)):
-        return 1.0 / max(p_hit, _LEAST_P_HIT)
+def trials_to_go(p_hit: float, told: Memory) -> float | None:
+    """Trials that are expected to the next hit, that one included, after those that were told.
+
+    None where a hit is next to impossible.
+    """
+    if p_hit < _LEAST_P_HIT:
+        return None
+    of_goal = told.only(np.all(told.goals == told.goals[-1:], axis=1))
+    bare = of_goal.missed & np.all(np.isinf(of_goal.high - of_goal.low), 1)
+    if len(bare) and np.all(bare):
+        return 1.0 / p_hit
     return 1.0 + _TRIALS_AFTER_A_MISS * (1.0 - p_hit)

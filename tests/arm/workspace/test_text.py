@@ -67,3 +67,8 @@ def test_a_goal_far_outside_may_be_refused_and_a_nearer_one_is_named(workspace):
     assert "if it refuses, a goal nearer" in describe(workspace).splitlines()[-1]
     ask(workspace)  # nothing refused it
     assert "nearer" not in describe(workspace)
+
+
+def test_how_many_trials_are_to_go_is_left_out_where_nobody_knows(workspace):
+    trial = replace(ask(workspace), p_hit=1e-8, expected_trials=None)
+    assert say_expectation(workspace.standing, trial)[0] == "a hit is unlikely"

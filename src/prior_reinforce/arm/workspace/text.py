@@ -62,10 +62,11 @@ def _say_trial(now: Standing, trial: Trial) -> str:
 def say_expectation(now: Standing, trial: Trial) -> list[str]:
     """Say what the adapter expected of a trial, and after poor ones what would help."""
     state = now.state
-    if trial.p_hit is None or trial.expected_trials is None:
+    if trial.p_hit is None:
         return []
-    chance = say_chance(trial.p_hit)
-    lines = [f"a hit is {chance}; {say_trials(trial.expected_trials)} trials to go"]
+    lines = [f"a hit is {say_chance(trial.p_hit)}"]
+    if trial.expected_trials is not None:
+        lines[0] += f"; {say_trials(trial.expected_trials)} trials to go"
     if trial.remark:
         lines.append(trial.remark)
     told = [known for known in state.trials if known.stage is Stage.TOLD]

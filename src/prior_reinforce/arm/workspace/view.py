@@ -90,7 +90,8 @@ class TrialView(View, frozen=True):
     chance: str | None
     """The same in a word, which is what it can be trusted to."""
     expected_trials: float | None
-    """Trials until the goal is reached, this one included, likewise."""
+    """Trials until the goal is reached, this one included, likewise; null too where a hit is hardly
+    possible."""
     to_go: str | None
     """The same in words: `about 2.2`, or `more than 10`, beyond which it is a guess."""
     surprise: str | None
