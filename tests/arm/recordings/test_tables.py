@@ -35,6 +35,15 @@ def test_whatever_pandas_writes(tmp_path, sep, decimal, index, encoding):
     np.testing.assert_array_equal(numbers(table), FRAME)
 
 
+@pytest.mark.parametrize("sep", [",", ";"])
+def test_an_empty_last_cell_makes_no_decimal_comma(tmp_path, sep):
+    path = tmp_path / "a.csv"
+    path.write_text("episode,landing spot [cm]\n0,101\n1,\n2,151\n".replace(",", sep))
+    table = one(path)
+    assert table.names == ("episode", "landing spot [cm]")
+    assert table.cells == (["0", "1", "2"], ["101", "", "151"])
+
+
 def test_what_numpy_writes_has_its_names_in_a_comment(tmp_path):
     path = tmp_path / "a.csv"
     np.savetxt(path, FRAME, header="t q1 q2", fmt="%.6g")

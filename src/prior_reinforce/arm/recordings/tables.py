@@ -232,9 +232,11 @@ def _split(lines: Iterable[str], delimiter: str, *, strict: bool = False) -> Any
 def _dialect(lines: Sequence[str], delimiter: str | None, decimal: str | None) -> tuple[str, str]:
     """Delimiter and decimal sign under which the lines are rows of one width and mostly numbers."""
     body = lines[min(1, len(lines) - 1) :]
+    if all(line.endswith((",", ";")) for line in body):  # of some rows, the last cell is empty
+        body = [line.rstrip(";,") for line in body]
 
     def score(dialect: tuple[str, str]) -> tuple[float, int]:
-        rows: list[list[str]] = [next(_split([line.rstrip(";,")], dialect[0]), []) for line in body]
+        rows: list[list[str]] = [next(_split([line], dialect[0]), []) for line in body]
         cells = [cell for row in rows for cell in row if cell.strip()]
         numeric = sum(_is_number(cell, dialect[1]) for cell in cells) / max(len(cells), 1)
         width, often = Counter(map(len, rows)).most_common(1)[0]
