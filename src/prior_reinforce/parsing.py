@@ -200,6 +200,10 @@ def as_reading(
         reading = seen
     else:
         reading = Reading.estimated(as_bare_error(seen, goal, form), form.least_sd)
+    if hit is not None and reading.hit is not None and reading.hit != hit:
+        said, other = ("hit", "miss") if reading.hit else ("miss", "hit")
+        quoted = f' in "{reading.said}"' * bool(reading.said)
+        raise InvalidFeedbackError(f"{said}{quoted} contradicts {other}; say one of them")
     reading = reading.with_hit(hit)
     if reading.hit is None and not reading.has_number:
         raise InvalidFeedbackError(f'"{reading.said}" says nothing of where it went; say lost')

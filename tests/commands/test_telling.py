@@ -3,7 +3,27 @@
 import numpy as np
 import pytest
 
-from tests.arm.workspace.planar import events_in, trials_in
+from prior_reinforce.arm.workspace.workspace import Workspace
+from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.plans.motions import Demonstrations
+from tests.arm.workspace.planar import FORMAT, events_in, manifest, trials_in
+
+
+@pytest.fixture
+def line(tmp_path, monkeypatch):
+    """A task of one outcome in cm, learned, whose first trial waits; its name."""
+    monkeypatch.chdir(tmp_path)
+    outcomes = np.array([[80.0], [90.0], [100.0], [110.0]])
+    plans = outcomes[:, None] * np.linspace(0.0, 0.01, 24)[:, None] * np.ones(2)
+    form = OutcomeFormat(("distance",), ("cm",))
+    of_task = {"outcome_names": '["distance"]', "outcome_units": '["cm"]', "tolerance": 1.5}
+    with Workspace.create(tmp_path / "line", manifest(**of_task)) as workspace:
+        demonstrations = Demonstrations(plans, outcomes, FORMAT, outcome_format=form)
+        workspace.import_demonstrations(demonstrations, "made up")
+        workspace.learn("interpolation")
+        workspace.set_goal([95.0])
+        workspace.session().ask()
+    return "line"
 
 
 def asked(run, folder):
@@ -66,7 +86,10 @@ def test_an_error_can_be_told_in_many_ways(run, folder, said, seen):
         (("--outcome", "0.9+-0.1", "0.1+-0.1"), "is not 2 finite numbers"),
         (("--outcome", "there"), "cannot read 'there'"),
         (("somewhere",), '"somewhere" says nothing of where it went; say lost'),
-        (("--hit", "--miss"), "one of those alone"),
+        (("--hit", "--miss"), "drop one of them"),
+        (("hit", "--miss"), "say one of them"),
+        (("miss", "--hit"), "say one of them"),
+        (("lost", "--hit"), "say one of them"),
     ],
 )
 def test_what_cannot_be_told_is_one_line_and_changes_nothing(run, folder, said, remedy):
@@ -125,3 +148,18 @@ def test_where_it_ended_may_be_measured(run, folder):
     asked(run, folder)
     assert run("tell", folder, 1, "--outcome", "95cm 3cm +- 2mm")[0] == 0
     np.testing.assert_allclose(trials_in(folder)[0].reading.sd, [0.002, 0.002])
+
+
+@pytest.mark.parametrize(
+    ("number", "what"),
+    [
+        (1, "1 may be what was seen: prior-reinforce tell line 1 1; or the trial: prior-reinforce"),
+        (5, "there is no trial 5; if 5 is what was seen: prior-reinforce tell line 1 5\n"),
+        (-5, "there is no trial -5; if -5 is what was seen: prior-reinforce tell line 1 -5\n"),
+    ],
+)
+def test_a_number_alone_may_be_the_trial_or_what_was_seen(run, line, number, what):
+    status, _, err = run("tell", line, number)
+    assert status == 2
+    assert what in err
+    assert run("tell", line, 1, number)[0] == 0

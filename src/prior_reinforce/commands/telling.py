@@ -9,7 +9,14 @@ import numpy as np
 import tyro
 
 from prior_reinforce.arm.workspace.state import Standing
-from prior_reinforce.arm.workspace.text import execution_warning, next_step, say_outdated, say_trial
+from prior_reinforce.arm.workspace.text import (
+    call,
+    execution_warning,
+    next_step,
+    say_outdated,
+    say_trial,
+    tell_example,
+)
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.arrays import Point
 from prior_reinforce.commands import warn
@@ -54,12 +61,15 @@ class Seen(OnWorkspace):
         """Return the trial's number, what was seen and whether it hit, as for `Session.tell`."""
         number, seen = trial_and_rest(workspace, words)
         given = [bool(seen), self.error is not None, self.outcome is not None]
-        said = any(given) or self.hit or self.miss
-        if sum(given) > 1 or not said or (self.hit and self.miss):
+        if sum(given) > 1:
             raise ConfigurationError(
-                "say what was seen: words or numbers, or --error or --outcome, with --hit or "
-                "--miss if that was seen as well, or one of those alone"
+                "say what was seen in one way: beside the trial's number, or with --error or "
+                "--outcome"
             )
+        if self.hit and self.miss:
+            raise ConfigurationError("--hit and --miss contradict each other; drop one of them")
+        if not (any(given) or self.hit or self.miss):
+            raise ConfigurationError(_ask_what_was_seen(workspace, number, words))
         hit = True if self.hit else False if self.miss else None
         goal = workspace.state.goal_of(workspace.state.trial(number))
         if self.outcome is not None:
@@ -127,6 +137,18 @@ class Void(OnWorkspace):
         now = workspace.standing
         print(f"trial {trial.number}: {say_trial(now, trial)}; nothing is learned from it")
         print(*say_outdated(now.state), f"next: {next_step(now)}", sep="\n")
+
+
+def _ask_what_was_seen(workspace: Workspace, number: int, words: tuple[str, ...]) -> str:
+    """Ask for it; or, where it was a number alone, which of the two that number is."""
+    now, waiting = workspace.standing, workspace.state.open_trial
+    seen = tell_example(now.manifest)
+    if words and waiting is not None and now.manifest.outcome_format.outcome_dim == 1:
+        as_seen = f"what was seen: {call(now.folder, 'tell', waiting.number, *words)}"
+        if not 1 <= number <= waiting.number:
+            return f"there is no trial {number}; if {number} is {as_seen}"
+        return f"{number} may be {as_seen}; or the trial: {call(now.folder, 'tell', number, seen)}"
+    return f"say what was seen of trial {number}, for instance {seen}, or --hit, or --miss"
 
 
 def _say_told(now: Standing, trial: Trial, typed: tuple[str, ...]) -> str:
