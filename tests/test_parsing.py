@@ -1,6 +1,7 @@
 """Errors and places, read from words or numbers, and said again."""
 
 import contextlib
+import re
 
 import numpy as np
 import pytest
@@ -9,10 +10,11 @@ from hypothesis import strategies as st
 
 from prior_reinforce.errors import InvalidFeedbackError
 from prior_reinforce.formats import OutcomeFormat
-from prior_reinforce.parsing import from_words, read_numbers, read_place, read_uncertain_place
+from prior_reinforce.parsing import from_words, read_place, read_uncertain_place
 from prior_reinforce.readings import Reading
 from prior_reinforce.wording import (
     error_example,
+    place_example,
     say_length,
     say_place,
     say_reading,
@@ -256,6 +258,36 @@ def test_metres_that_are_said_may_be_as_far_as_a_bat_strikes():
     np.testing.assert_allclose(read_place("9.7m -1m", METRES), [9.7, -1])
 
 
+@pytest.mark.parametrize(
+    ("names", "units"),
+    [
+        (("distance", "height"), ("cm", "cm")),
+        (("x", "y", "angle"), ("m", "m", "rad")),
+        (("how far past the line",), ("in",)),
+        (("x", "t"), ("m", "s")),
+        (("a", "b", "c", "d"), ("m", "m", "s", "1")),
+    ],
+)
+def test_what_is_printed_of_any_task_can_be_read(names, units):
+    form = OutcomeFormat(names, units)
+    numbers = np.array([0.9, -0.5, 0.3, 0.1])[: len(names)]
+    np.testing.assert_allclose(read_place(say_place(numbers, form), form), numbers)
+    np.testing.assert_allclose(read_place(place_example(form), form).shape, numbers.shape)
+    error = from_words(to_words(numbers, form), form)
+    np.testing.assert_allclose(error.error_seen, numbers)
+    with pytest.raises(InvalidFeedbackError, match=re.escape(place_example(form))):
+        read_place("over there", form)
+
+
+def test_words_and_other_numbers_may_stand_beside_each_other():
+    pose = OutcomeFormat(("x", "y", "angle"), ("m", "m", "rad"))
+    np.testing.assert_allclose(
+        read_place("60cm ahead, 5cm left, 20deg", pose), [0.6, 0.05, np.pi / 9]
+    )
+    with pytest.raises(InvalidFeedbackError, match="3 finite numbers: x, y, angle"):
+        read_place("60cm ahead, 5cm left", pose)
+
+
 def test_a_place_in_another_unit_is_converted():
     assert read_place("30 deg", of("rad")) == pytest.approx([np.pi / 6])
     assert read_place("0.5rad", of("deg")) == pytest.approx([90 / np.pi])
@@ -402,11 +434,7 @@ def test_other_words_of_other_units_are_refused(text, units, says):
         from_words(text, of(*units))
 
 
-def test_numbers_with_what_stands_behind_plus_minus():
-    assert read_numbers("0.05 +- 0.003, -0.02±0.001 1") == [
-        (0.05, 0.003), (-0.02, 0.001), (1.0, None),
-    ]  # fmt: skip
-    assert read_numbers("0.05 +- x") is None
+def test_a_place_may_have_one_spread():
     place, sd = read_uncertain_place("80 20 cm +/- 5 cm", METRES)
     np.testing.assert_allclose([*place, sd], [0.8, 0.2, 0.05])
     with pytest.raises(InvalidFeedbackError, match="components of one unit"):

@@ -5,7 +5,7 @@ import pytest
 
 from prior_reinforce.errors import InvalidFeedbackError
 from prior_reinforce.formats import OutcomeFormat
-from prior_reinforce.parsing import from_words, read_numbers, read_place, with_points
+from prior_reinforce.parsing import from_words, read_place
 from prior_reinforce.wording import (
     in_words,
     say_chance,
@@ -137,7 +137,6 @@ def test_a_range_has_decimal_commas():
         seen = from_words(text, METRES)
         np.testing.assert_allclose([seen.low[0], seen.high[0]], [-0.025, -0.015])
     assert from_words("1,5 +- 0,5 cm short", METRES).sd[0] == pytest.approx(0.005)
-    assert read_numbers(with_points("5+-1,2+-1", 2)) == [(5, 1), (2, 1)]
     with pytest.raises(InvalidFeedbackError, match="may be a thousand"):
         from_words("1,500-2,500 mm short", METRES)
 

@@ -22,6 +22,8 @@ from numpy.typing import ArrayLike
 from prior_reinforce.arrays import Point, as_error, as_goal
 from prior_reinforce.errors import InvalidFeedbackError, InvalidGoalError
 from prior_reinforce.formats import OutcomeFormat, in_tolerances
+from prior_reinforce.numerals import NUMBER, PLUS_MINUS, WITH_COMMA, read_numbers, with_points
+from prior_reinforce.phrases import plainer, values_by_name
 from prior_reinforce.readings import EYE_BETWEEN, OPEN_ERROR, Reading
 from prior_reinforce.units import SPELT, factor, kind_of, looks_like, spelt, units_of
 from prior_reinforce.wording import (
@@ -30,6 +32,7 @@ from prior_reinforce.wording import (
     WORDS,
     bare_unit,
     error_words,
+    place_example,
     say_unread,
 )
 
@@ -45,20 +48,11 @@ _TOO_LARGE = {"length": "farther than any arm throws", "angle": "more than a tur
 _SOMEWHERE, _LOST = "somewhere", "lost"
 _ON_THE_GOAL = ("on the goal", "spot on", "0")
 _HITS = {"hit": True, "miss": False, _LOST: False}
-_FILLERS = re.compile(r"\b(?:about|approximately|approx\.?|around|roughly|circa|ca\.?|too)\s+|~\s*")
-"""What people say beside a length, which is an estimate anyway."""
-_INNER_COMMA = re.compile(r"(?<=\d),(?=\d)")
-_DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d+\s*(?:[-–±+/]+\s*[\d.,]+\s*)?(?:[^\W\d_]|[°\"%]))")
-_BETWEEN, _LAST_UNIT = re.compile(r"[;,]?\s+|;"), re.compile(r"\s*(?:[^\W\d_]|[°\"%])\S*$")
 _RANGE = re.compile(r"(?<=[\da-z\"°.])\s*(?:–|-|\bto\b)\s*(?=\.?\d)")
 _COMMA, _NEXT = re.compile(r"\s*(?:,|;|\band\b)\s*"), re.compile(r"(?<=[a-z])\s+(?=\.?\d)")
-_PLUS_MINUS = r"(?:\+-|\+/-|±)"
-_NUMBER = r"\d{1,6}(?:\.\d*)?|\.\d+"
-_LENGTHS = "|".join(re.escape(each) for each, unit in SPELT.items() if kind_of(unit) == "length")
-_BARE_TERM = re.compile(rf"(?P<value>{_NUMBER})\s*(?P<unit>{_LENGTHS})")  # `92cm`
+_BARE_TERM = re.compile(rf"(?P<value>{NUMBER})\s*(?P<unit>{'|'.join(map(re.escape, SPELT))})")
+"""`92cm`."""
 _SYNONYMS = {"far": "long", "beyond": "long", "above": "high", "below": "low"}
-_WITH_COMMA = re.compile(r"[+-]?\d+(?:[.,]\d+)?")
-_THOUSAND = re.compile(r"(?<![\d.,])[1-9]\d{0,2},\d{3}(?![\d.])")
 
 
 @lru_cache(maxsize=8)
@@ -74,32 +68,14 @@ def _patterns(units: tuple[str, ...]) -> tuple[re.Pattern[str], ...]:
         for each in sorted({*SPELT, *own}, key=len, reverse=True)
     )
     term = (
-        rf"(?:(?:(?P<least>{_NUMBER})\s*(?P<least_unit>{unit})\s*-\s*)?"
-        rf"(?P<value>{_NUMBER})\s*(?P<unit>{unit})\s*"
-        rf"(?:{_PLUS_MINUS}\s*(?P<sd>{_NUMBER})\s*(?P<sd_unit>{unit})\s*)?)?"
+        rf"(?:(?:(?P<least>{NUMBER})\s*(?P<least_unit>{unit})\s*-\s*)?"
+        rf"(?P<value>{NUMBER})\s*(?P<unit>{unit})\s*"
+        rf"(?:{PLUS_MINUS}\s*(?P<sd>{NUMBER})\s*(?P<sd_unit>{unit})\s*)?)?"
         r"(?:to the )?(?P<word>[a-z]+)"
     )
-    word_first = rf"([a-z]+)\s+(?:by\s+)?((?:{_NUMBER})\s*(?:{unit}))"
-    place = rf"(?P<number>[+-]?(?:{_NUMBER}))\s*(?P<unit>{unit})(?:\s*[,;]\s*|\s+|$)"
+    word_first = rf"([a-z]+)\s+(?:by\s+)?((?:{NUMBER})\s*(?:{unit}))"
+    place = rf"(?P<number>[+-]?(?:{NUMBER}))\s*(?P<unit>{unit})(?:\s*[,;]\s*|\s+|$)"
     return tuple(re.compile(each, re.IGNORECASE) for each in (term, word_first, place))
-
-
-def with_points(text: str, k: int) -> str:
-    """Return a text whose decimal commas are points, and whose minuses are as typed.
-
-    A comma is decimal where a unit, a word or a range follows, `1,2 cm`, or where there are k
-    numbers, `0,92 0,1 m` of two. InvalidFeedbackError where it may part thousands: `1,500 mm`.
-    """
-    text = text.replace("\u2212", "-")
-    numbers = _BETWEEN.split(_LAST_UNIT.sub("", text.strip()))
-    all_numbers = len(numbers) == k and all(map(_WITH_COMMA.fullmatch, numbers))
-    pointed = (_INNER_COMMA if all_numbers else _DECIMAL_COMMA).sub(".", text)
-    if pointed != text and (found := _THOUSAND.search(text)):
-        whole, decimal = found[0].replace(",", ""), found[0].replace(",", ".")
-        raise InvalidFeedbackError(
-            f"{found[0]} in {text!r} may be a thousand; write {whole}, or {decimal}"
-        )
-    return pointed
 
 
 def from_words(text: str, form: OutcomeFormat | None = None) -> Reading:
@@ -124,6 +100,10 @@ def from_words(text: str, form: OutcomeFormat | None = None) -> Reading:
         InvalidFeedbackError: Unknown words, or one direction named twice.
     """
     form = (form or OutcomeFormat.metres(2)).as_listed()
+    if (error := _by_name(text, form)) is not None:
+        for number, unit in zip(error, form.units, strict=True):
+            _refuse_too_large(number, unit, text)
+        return replace(Reading.estimated(error, form.least_sd), said=text)
     parts = _parts(text, form)
     hits = {_HITS[part] for part in parts if part in _HITS}
     if len(hits) > 1:
@@ -141,6 +121,15 @@ def from_words(text: str, form: OutcomeFormat | None = None) -> Reading:
     as_it_is = all(part == said for part, said in understood.items())
     said = text if as_it_is else ", ".join(understood.get(part, part) for part in parts)
     return replace(_reading(terms, text, form, _SOMEWHERE in parts), hit=hit, said=said)
+
+
+def _by_name(text: str, form: OutcomeFormat) -> list[float] | None:
+    """Read an error as `to_words` may print it, `x +5 cm, t -0.1 s`; None if it is no such text."""
+    values = values_by_name(text.replace("\u2212", "-"), form.names)
+    if values is None or read_numbers(values) is not None:  # without units
+        return None
+    numbers = _numbers_with_units(with_points(values, form.outcome_dim), form.units)
+    return numbers if numbers and all(map(math.isfinite, numbers)) else None
 
 
 def _reading(terms: dict[int, _Term], text: str, form: OutcomeFormat, somewhere: bool) -> Reading:
@@ -200,10 +189,9 @@ def as_reading(
         reading = seen
     else:
         reading = Reading.estimated(as_bare_error(seen, goal, form), form.least_sd)
-    if hit is not None and reading.hit is not None and reading.hit != hit:
-        said, other = ("hit", "miss") if reading.hit else ("miss", "hit")
-        quoted = f' in "{reading.said}"' * bool(reading.said)
-        raise InvalidFeedbackError(f"{said}{quoted} contradicts {other}; say one of them")
+    if reading.said and None not in (hit, reading.hit) and reading.hit != hit:
+        beside = "hit" if hit else "miss"
+        raise InvalidFeedbackError(f'"{reading.said}" contradicts {beside}; say one of them')
     reading = reading.with_hit(hit)
     if reading.hit is None and not reading.has_number:
         raise InvalidFeedbackError(f'"{reading.said}" says nothing of where it went; say lost')
@@ -259,24 +247,13 @@ def as_place(place: ArrayLike | str, form: OutcomeFormat) -> Point:
     return array
 
 
-def read_numbers(text: str) -> list[tuple[float, float | None]] | None:
-    """Read numbers, each with that after its `+-` (`0.05+-0.003, -0.02 ± 0.001`); None if none."""
-    mark = ";" if ";" in text else ","
-    parts = re.sub(rf"\s*{_PLUS_MINUS}\s*", "±", text).replace(mark, " ").split()
-    try:
-        split = [part.split("±") for part in parts]
-        return [(float(number), float(*sd) if sd else None) for number, *sd in split]
-    except (ValueError, TypeError):
-        return None
-
-
 def read_uncertain_place(text: str, form: OutcomeFormat) -> tuple[Point, float]:
     """Read a place, and the standard deviation that may follow it: `92cm 10cm +- 2cm`.
 
     Raises:
         InvalidFeedbackError: As `read_place` does, or a `+-` for components of several units.
     """
-    said, *spread = re.split(_PLUS_MINUS, text, maxsplit=1)
+    said, *spread = re.split(PLUS_MINUS, text, maxsplit=1)
     place, of_sd = read_place(said, form), OutcomeFormat(("+-",), form.units[:1])
     sd = abs(float(read_place(spread[0], of_sd)[0])) if spread else 0.0
     if sd and len(set(form.units)) > 1:
@@ -287,34 +264,38 @@ def read_uncertain_place(text: str, form: OutcomeFormat) -> tuple[Point, float]:
 def read_place(text: str, form: OutcomeFormat) -> Point:
     """Read a place from numbers in the outcome's units, numbers with a unit, or words.
 
-    For instance `0.92 0.10`, `92cm 10cm`, `92 10 cm`, or `92cm ahead, 10cm left`; beside words, a
-    length without one is the component in that position: `92cm, 10cm left`.
+    For instance `0.92 0.10`, `92cm 10cm`, `92 10 cm`, `x 92cm, y 10cm`, or `92cm ahead, 10cm left`;
+    beside words, a number without one is the component in that position: `92cm, 10cm left`.
 
     Raises:
         InvalidFeedbackError: It is none of these, has a `+-`, or is farther than any arm throws.
     """
-    if re.search(_PLUS_MINUS, text):
+    if re.search(PLUS_MINUS, text):
         raise InvalidFeedbackError(f"cannot read {text!r} as one place; leave out the +-")
     k, form = form.outcome_dim, form.as_listed()
-    expected = f"{k} finite numbers: {', '.join(form.names)}"
+    expected = f"{k} finite numbers: {', '.join(form.names)}, for instance {place_example(form)}"
+    text = values_by_name(text, form.names) or text
     numbers = _numbers_with_units(text.replace("\u2212", "-"), form.units)
     if numbers is None or len(numbers) != k:
         text = with_points(text, k)
         numbers = _numbers_with_units(text, form.units)
     if numbers is None:
-        if k > len(WORDS) or {kind_of(unit) for unit in form.units} != {"length"}:
+        lengths = [kind_of(unit) == "length" for unit in form.units]
+        terms = dict[int, _Term]()
+        if k <= len(WORDS) and any(lengths):
+            terms = _terms(_parts(text, form), text, form, place=True)
+        if any(j not in terms for j in range(k) if not all(lengths)):
             raise InvalidFeedbackError(f"cannot read {text!r}; give {expected}")
-        place = np.zeros(k)
-        for j, term in _terms(_parts(text, form), text, form, place=True).items():
-            place[j] = term.sign * (term.size or 0.0)
-        return place
+        return np.array(
+            [terms[j].sign * (terms[j].size or 0.0) if j in terms else 0.0 for j in range(k)]
+        )
     if len(numbers) != k or not all(map(math.isfinite, numbers)):
         raise InvalidFeedbackError(f"{text!r} is not {expected}; give those")
     stated = read_numbers(text) is None
     for number, unit in zip(numbers, form.units, strict=True):
         possible = unit == "m" and not looks_like(unit, number, stated=True)
         said = looks_like(unit, number)
-        if said and not looks_like(unit, numbers[0]) and _WITH_COMMA.fullmatch(text.strip()):
+        if said and not looks_like(unit, numbers[0]) and WITH_COMMA.fullmatch(text.strip()):
             raise InvalidFeedbackError(f"{text!r} may be one number; give {expected}")
         if said and not (stated and possible):
             raise InvalidFeedbackError(
@@ -342,7 +323,7 @@ def _numbers_with_units(text: str, units: Sequence[str]) -> list[float] | None:
     numbers = []
     for term, unit, wanted in zip(terms, stated, units, strict=True):
         number = float(term["number"])
-        scale = factor(unit or (wanted if number == 0.0 else ""), wanted)
+        scale = factor(unit or (wanted if number == 0.0 or wanted == "1" else ""), wanted)
         if scale is None:
             return None
         numbers.append(number * scale)
@@ -367,8 +348,8 @@ class _Term:
 
 def _parts(text: str, form: OutcomeFormat) -> list[str]:
     """Split a text at commas, without fillers, in lower case."""
-    plainer = with_points(_FILLERS.sub("", text.strip().lower()), 0)
-    said = [part.rstrip(".! ") for part in _COMMA.split(_RANGE.sub("-", plainer))]
+    plain = with_points(plainer(text), 0)
+    said = [part.rstrip(".! ") for part in _COMMA.split(_RANGE.sub("-", plain))]
     _, first, _ = _patterns(form.units)
     turned = [first.sub(r"\2 \1", p) if first.fullmatch(p) else p for p in said]
     return [part.rstrip(".! ") for each in turned for part in _NEXT.split(each)]
@@ -380,6 +361,11 @@ def _terms(
     """Read parts as terms, by component; a place has a number for each, and no `+-`."""
     words = PLACE_WORDS if place else WORDS
     pairs = error_words(form, words)
+    if place:
+        kinds = map(kind_of, form.units)
+        pairs = [
+            pair if kind == "length" else None for pair, kind in zip(pairs, kinds, strict=True)
+        ]
     known = {word: (j, pair) for j, pair in enumerate(pairs) if pair for word in pair}
     # Whatever is more of it; which sign was understood is said.
     invented = form.outcome_dim == 1 and kind_of(form.units[0]) not in ("length", "time")
@@ -391,7 +377,8 @@ def _terms(
         found = {} if match is None else match.groupdict()
         if not place and found:
             found["word"] = _SYNONYMS.get(found["word"], found["word"])
-        if bare is not None and place and len(parts) > 1 and position < len(pairs):
+        beside = place and len(parts) > 1 and position < len(pairs)
+        if bare and beside and factor(SPELT[bare["unit"]], form.units[position]) is not None:
             found, j, pair = bare.groupdict(), position, pairs[position]
         elif found.get("word") not in known or (
             place and (not found["value"] or found["sd"] or found["least"])

@@ -19,6 +19,7 @@ from __future__ import annotations
 import html
 import re
 from collections.abc import Sequence
+from itertools import cycle
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,6 +41,7 @@ CHANCES = (0.0, 0.1), (0.1, 0.65), (0.65, 1.0)
 _FEW_TRIALS = 10
 """Beyond, the number is a guess, and is not said (ours)."""
 _EXAMPLE_LENGTHS = ("5cm", "2cm", "1cm")
+_EXAMPLE_PLACE = (92, 10, 5)
 _FROM_BASE = re.compile(r"(?P<length>.*?)\s*(?:away )?from (?:the )?(?:base|robot|arm|foot)\b.*")
 _EXAMPLES = {"time": "20ms", "angle": "5deg"}
 
@@ -137,6 +139,18 @@ def error_example(form: OutcomeFormat) -> str:
     return ", ".join(said) if len(said) == form.outcome_dim else ""
 
 
+def place_example(form: OutcomeFormat) -> str:
+    """A place as it can be said: `92cm ahead, 10cm left`, or `distance 92cm, height 10cm`."""
+    numbers = _EXAMPLE_PLACE[: form.outcome_dim]
+    if in_words(form):
+        words = (PLACE_WORDS[axis][0] for axis in axes_of(form))
+        return ", ".join(f"{number}cm {word}" for number, word in zip(numbers, words, strict=True))
+    return ", ".join(
+        f"{name} {number}" + f"{spoken(unit)[0]}" * (unit != "1")
+        for name, number, unit in zip(form.names, cycle(numbers), form.units, strict=False)
+    )
+
+
 def say_unread(part: str, text: str, known: Sequence[str], form: OutcomeFormat, place: bool) -> str:
     """Say that a part of a text cannot be read, and what may stand there: one of `known`."""
     if place and (from_base := _FROM_BASE.fullmatch(part)):
@@ -144,7 +158,7 @@ def say_unread(part: str, text: str, known: Sequence[str], form: OutcomeFormat, 
             f"{part!r} may be straight to the place or along x only; measure along x and say "
             f"{from_base['length']} {known[0]}"
         )
-    example = "92cm ahead, 10cm left" if place else error_example(form)
+    example = place_example(form) if place else error_example(form)
     said = f', for instance "{example}"' * bool(example) + ', or "hit"' * (not place)
     where = "" if part == text.strip().lower() else f" in {text!r}"
     unknown = [
@@ -160,7 +174,8 @@ def say_unread(part: str, text: str, known: Sequence[str], form: OutcomeFormat, 
         where += f": it has {unknown[0]!r}, which is no unit{listed} and no direction"
     elif "/" in part:
         where += ": write 0.5 for 1/2"
-    return f"cannot read {part!r}{where}; write a length and one of {', '.join(known)}{said}"
+    words = f"a length and one of {', '.join(known)}" if known else "a number and its unit"
+    return f"cannot read {part!r}{where}; write {words}{said}"
 
 
 def _example(j: int, unit: str, k: int) -> str:
