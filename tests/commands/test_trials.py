@@ -262,7 +262,8 @@ def test_a_command_that_failed_before_the_arm_moved_costs_no_trial(run, folder, 
     status, out, _ = run("ask", folder, "--yes", "--run", f"{sys.executable} {broken} {{plan}}")
     assert status == 1
     assert out.rstrip().endswith(
-        "if it failed before the arm moved: prior-reinforce ask planar --arm-did-not-move"
+        "next: if it moved: prior-reinforce void planar 1 --reason WHY; if not: "
+        "prior-reinforce ask planar --arm-did-not-move"
     )
     again = ("ask", folder, "--arm-did-not-move")
     status, out, _ = run(*again)

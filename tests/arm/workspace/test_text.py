@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from prior_reinforce.arm.workspace.text import say_expectation
+from prior_reinforce.arm.workspace.text import goal_step, say_expectation, tell_example
+from prior_reinforce.formats import OutcomeFormat
 from tests.arm.workspace.planar import amend, ask, describe, tell
 
 
@@ -72,3 +73,11 @@ def test_a_goal_far_outside_may_be_refused_and_a_nearer_one_is_named(workspace):
 def test_how_many_trials_are_to_go_is_left_out_where_nobody_knows(workspace):
     trial = replace(ask(workspace), p_hit=1e-8, expected_trials=None)
     assert say_expectation(workspace.standing, trial)[0] == "a hit is unlikely"
+
+
+def test_a_name_of_several_words_is_one_word_where_a_number_is_to_be_typed(workspace):
+    form = OutcomeFormat(("landing spot", "how long it rolls"), ("furlong", "beat"), (1.0, 1.0))
+    now = workspace.standing
+    now = replace(now, manifest=replace(now.manifest, outcome_format=form))
+    assert goal_step(now).endswith(" LANDING_SPOT HOW_LONG_IT_ROLLS")
+    assert tell_example(now.manifest) == "--error DLANDING_SPOT DHOW_LONG_IT_ROLLS"

@@ -161,9 +161,10 @@ def next_step(now: Standing) -> str:
         case "settle":
             did_not_move = call(folder, "ask", "--arm-did-not-move")
             if state.stage(trial) == "executing":
-                return f"if it moved: {tell}; if not: {did_not_move}"
-            void = call(folder, "void", trial.number, "--reason WHY")
-            return f"{void}; if it failed before the arm moved: {did_not_move}"
+                moved = tell
+            else:
+                moved = call(folder, "void", trial.number, "--reason WHY")
+            return f"if it moved: {moved}; if not: {did_not_move}"
         case "execute" if now.manifest.driven_by or trial.number in state.executions:
             return execute_step(now, trial)
     return f"{tell} (or --hit)"
@@ -171,8 +172,7 @@ def next_step(now: Standing) -> str:
 
 def goal_step(now: Standing) -> str:
     """The command that sets a goal."""
-    place = " ".join(name.upper() for name in now.manifest.outcome_format.names)
-    return call(now.folder, "goal", place)
+    return call(now.folder, "goal", *map(_placeholder, now.manifest.outcome_format.names))
 
 
 def execute_step(now: Standing, trial: Trial) -> str:
@@ -216,4 +216,9 @@ def tell_example(manifest: Manifest) -> str:
     form = manifest.outcome_format
     if example := error_example(form):  # without numbers, which somebody in a hurry would take
         return f'--error "{re.sub("[0-9]+", "_", example)}"'
-    return "--error " + " ".join(f"D{name.upper()}" for name in form.names)
+    return "--error " + " ".join(f"D{_placeholder(name)}" for name in form.names)
+
+
+def _placeholder(name: str) -> str:
+    """What stands in a command for a number, in one word: `LANDING_SPOT`."""
+    return re.sub(r"\W+", "_", name.strip()).upper()
