@@ -15,6 +15,7 @@ from prior_reinforce.arm.executing.lock import (
     executing_lock,
     is_executing,
     marked,
+    programs_executing,
     stop_executing,
     stop_marked,
 )
@@ -67,6 +68,7 @@ def test_what_holds_it_outlives_who_took_it(tmp_path, close):
         )
     try:
         assert is_executing(tmp_path)
+        assert programs_executing(tmp_path) == [(driver.pid, "sleep 60")] * close
         for folder in (tmp_path, None):
             with pytest.raises(TrialStateError, match="wait for it"), executing_lock(folder):
                 pass

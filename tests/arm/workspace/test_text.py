@@ -4,7 +4,14 @@ from dataclasses import replace
 
 import pytest
 
-from prior_reinforce.arm.workspace.text import goal_step, say_expectation, tell_example
+from prior_reinforce.arm.workspace import text
+from prior_reinforce.arm.workspace.events import Moving
+from prior_reinforce.arm.workspace.text import (
+    goal_step,
+    next_step,
+    say_expectation,
+    tell_example,
+)
 from prior_reinforce.formats import OutcomeFormat
 from tests.arm.workspace.planar import amend, ask, describe, tell
 
@@ -81,3 +88,15 @@ def test_a_name_of_several_words_is_one_word_where_a_number_is_to_be_typed(works
     now = replace(now, manifest=replace(now.manifest, outcome_format=form))
     assert goal_step(now).endswith(" LANDING_SPOT HOW_LONG_IT_ROLLS")
     assert tell_example(now.manifest) == "--error DLANDING_SPOT DHOW_LONG_IT_ROLLS"
+
+
+def test_while_the_arms_program_runs_it_is_named_and_waited_for(workspace, monkeypatch):
+    trial, now = ask(workspace), workspace.standing
+    now.state.moves[trial.number] = Moving(trial.number, "trial", "arm.sh", "1-1")
+    monkeypatch.setattr(text, "programs_executing", lambda folder: [(71, "arm.sh plan.npz")])
+    vars(now)["moving"] = False
+    assert next_step(now).startswith("prior-reinforce tell")
+    vars(now)["moving"] = True
+    said, then = next_step(now).split("; wait for its end, then: ")
+    assert "(pid 71: arm.sh plan.npz)" in said
+    assert then.startswith("prior-reinforce tell")

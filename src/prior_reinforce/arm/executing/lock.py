@@ -104,6 +104,21 @@ def is_executing(folder: Path) -> bool:
         return not _flock(folder, descriptor, shared=True) or bool(marked(_name_of_folder(folder)))
 
 
+def programs_executing(folder: Path) -> list[tuple[int, str]]:
+    """Process id and command line of what executes a trial of a workspace, supervisors left out.
+
+    Raises:
+        ConfigurationError: No processes can be looked at.
+    """
+    found = []
+    for pid in marked(_name_of_folder(folder)):
+        with suppress(OSError):  # it ended meanwhile
+            words = Path("/proc", str(pid), "cmdline").read_bytes().split(b"\0")
+            if not any(word.endswith(b"supervisor.py") for word in words):
+                found.append((pid, os.fsdecode(b" ".join(words)).strip()))
+    return found
+
+
 def stop_executing(folder: Path) -> None:
     """Stop what executes a trial of a workspace, whoever started it, and wait for its end.
 

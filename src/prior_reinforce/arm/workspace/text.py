@@ -7,6 +7,7 @@ import shlex
 from pathlib import Path
 from typing import Literal
 
+from prior_reinforce.arm.executing.lock import programs_executing
 from prior_reinforce.arm.workspace.events import Moved, Moving
 from prior_reinforce.arm.workspace.manifest import Manifest, workspace_around
 from prior_reinforce.arm.workspace.state import Standing
@@ -137,7 +138,20 @@ def call(folder: Path, command: str, *words: object) -> str:
 
 
 def next_step(now: Standing) -> str:
-    """The command that comes next; see `Standing.step`."""
+    """The command that comes next; see `Standing.step`. While the arm moves, wait for it before."""
+    step = _next_step(now)
+    if now.state.moves and now.moving:
+        return f"{say_moving(now)}; wait for its end, then: {step}"
+    return step
+
+
+def say_moving(now: Standing) -> str:
+    """Say that a motion is made right now, and by what program."""
+    programs = [f"pid {pid}: {command:.80}" for pid, command in programs_executing(now.folder)]
+    return plain("the arm's program still runs" + "".join(f" ({each})" for each in programs[:1]))
+
+
+def _next_step(now: Standing) -> str:
     state, trial, folder = now.state, now.state.open_trial, now.folder
     if trial is None:
         match now.step:
