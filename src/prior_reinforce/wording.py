@@ -194,6 +194,16 @@ def say_length(length: float, form: OutcomeFormat) -> str:
     return f"{float(f'{length:.3g}'):g} {unit}".strip()
 
 
+def say_beyond(beyond: ArrayLike, form: OutcomeFormat) -> str:
+    """Say how far a place lies outside of others, where it does: `29 cm in x, 2 cm in y`."""
+    parts = zip(np.asarray(beyond, float), form.names, form.units, strict=True)
+    return ", ".join(
+        f"{say_length(value, OutcomeFormat((name,), (unit,)))} in {name}"
+        for value, name, unit in parts
+        if value > 0.0
+    )
+
+
 def bare_units(form: OutcomeFormat) -> str:
     """Say what `from_words` takes a number without a unit for: `centimetres`, `inches`, `rad`."""
     bare = [

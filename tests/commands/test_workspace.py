@@ -122,6 +122,20 @@ def test_a_goal_may_be_said_with_a_unit_or_in_words(run, folder, place):
     assert run("goal", folder, *place)[1].startswith("goal 1: 90 cm ahead, 5 cm right")
 
 
+@pytest.mark.filterwarnings("always::UserWarning")
+@pytest.mark.parametrize(
+    ("place", "how_far"),
+    [(("1.05", "0.3"), "5 cm in x, 10 cm in y"), (("2", "0.1"), "100 cm in x")],
+)
+def test_how_far_outside_a_goal_lies_is_said_at_once_with_the_nearest_inside(
+    run, folder, place, how_far
+):
+    _, out, err = run("goal", folder, *place)
+    (said,) = [line for line in (out + err).splitlines() if "outside what was demonstrated" in line]
+    assert f"lies {how_far} " in said
+    assert f"100 cm ahead, {'20' if place[1] == '0.3' else '10'} cm left" in said
+
+
 def test_a_goal_in_centimetres_without_a_unit_is_refused(run, folder):
     status, _, err = run("goal", folder, "65", "15")
     assert status == 2

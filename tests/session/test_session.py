@@ -437,7 +437,9 @@ def test_a_refused_plan_never_leaves_whenever_it_is_asked_for():
         RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, GOAL, 0.015, gate=gate
     )
     gate.limit = 0.5
-    with pytest.raises(RobotLimitError, match=r"no plan for the goal \[0\.9, 0\.1\]: 0\.9 is"):
+    with pytest.raises(
+        RobotLimitError, match=r"no plan for the goal 90 cm ahead, 10 cm left: 0\.9 is"
+    ):
         session.ask()
     assert session.trials == ()
     gate.limit = 10.0
@@ -497,8 +499,9 @@ def test_a_refusal_names_the_goal_what_was_asked_for_and_that_it_is_too_far():
     with pytest.raises(RobotLimitError) as refused:
         session.ask()
     assert str(refused.value).startswith(
-        "no plan for the goal [2.0, 0.1], asked of the generator as [2.01, 0.1], which lies far "
-        "outside the demonstrations (choose one nearer to them): "
+        "no plan for the goal 200 cm ahead, 10 cm left, for which the motion to 201 cm ahead, 10 "
+        "cm left was to be made, which lies far outside the demonstrations (choose one nearer to "
+        "them): "
     )
 
 

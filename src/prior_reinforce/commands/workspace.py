@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import msgspec
+import numpy as np
 import tyro
 
 from prior_reinforce.adapters import ADAPTERS, DEFAULT_ADAPTER
@@ -27,9 +28,10 @@ from prior_reinforce.commands.base import Json, OnWorkspace, Words, print_json, 
 from prior_reinforce.commands.questions import answer_to, until_read
 from prior_reinforce.errors import ConfigurationError, UnclearFlangeError
 from prior_reinforce.files import named_disk_errors
+from prior_reinforce.formats import in_tolerances
 from prior_reinforce.plans.kinematics import UPRIGHT, first_axis, leaning
 from prior_reinforce.units import UNITS
-from prior_reinforce.wording import say_place, say_tolerance
+from prior_reinforce.wording import say_beyond, say_place, say_tolerance
 
 AdapterChoice = Annotated[
     str, tyro.conf.arg(help=f"How the condition is corrected: {ADAPTERS.help}.")
@@ -173,6 +175,15 @@ def print_goal(workspace: Workspace) -> None:
     goal = workspace.state.goals[-1]
     place, within = say_place(goal.goal, goal.format), say_tolerance(goal.format)
     print(f"goal {goal.number}: {place}; within {within}")
+    shown, form = workspace.demonstrations, goal.format
+    near = shown.nearest_inside(goal.goal)
+    beyond = np.abs(goal.goal - near)
+    warned = shown.symmetry is not None or np.any(shown.far_outside(goal.goal))
+    if not warned and in_tolerances(beyond, goal.tolerance) > 1.0:
+        print(
+            f"it lies {say_beyond(beyond, form)} outside what was demonstrated; the nearest inside "
+            f"is {say_place(near, form)}"
+        )
 
 
 @dataclass(frozen=True)

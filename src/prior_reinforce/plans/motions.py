@@ -47,6 +47,7 @@ from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.signals import Signals, analyse
 from prior_reinforce.plans.symmetry import EXTRAPOLATED, Symmetry
 from prior_reinforce.units import UNITS, looks_like
+from prior_reinforce.wording import say_beyond, say_place
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -311,23 +312,20 @@ class Demonstrations:
         goal = as_goal(goal, self.outcome_format.names)
         beyond = self.far_outside(goal)
         if np.any(beyond):
-            low, high = self.outcomes_seen.min(axis=0), self.outcomes_seen.max(axis=0)
-            asked = ", ".join(f"{value:.4g}" for value in goal)
-            form, symmetry = self.outcome_format, self.symmetry
-            where = ", ".join(
-                f"{beyond[j]:.4g} {form.units[j]} outside the demonstrated {name} "
-                f"({low[j]:.4g} to {high[j]:.4g})"
-                if symmetry is None
-                else f"{beyond[j]:.4g} {form.units[j]} in {name} from where motions can be moved "
-                f"({symmetry.name})"
-                for j, name in enumerate(form.names)
-                if beyond[j] > 0
-            )
+            form, near = self.outcome_format, self.nearest_inside(goal)
+            where = f"outside what was demonstrated; the nearest inside is {say_place(near, form)}"
+            if self.symmetry is not None:
+                where = f"from where motions can be moved ({self.symmetry.name})"
             warnings.warn(
-                f"goal [{asked}] lies {where}; check its unit, or demonstrate nearer to it",
+                f"goal {say_place(goal, form)} lies {say_beyond(beyond, form)} {where}; check its "
+                "unit, or demonstrate nearer to it",
                 stacklevel=2,
             )
         return goal
+
+    def nearest_inside(self, goal: Point) -> Point:
+        """Return the place nearest to a goal whose components all lie between demonstrated ones."""
+        return np.clip(goal, self.outcomes_seen.min(axis=0), self.outcomes_seen.max(axis=0))
 
     def far_outside(self, goal: Point) -> Point:
         """How far a goal lies outside the outcomes, in their units; zeros where it is near enough.

@@ -23,6 +23,7 @@ from prior_reinforce.generators.reach import farthest_between, refusal
 from prior_reinforce.plans.symmetry import Polar
 from prior_reinforce.session.events import Asked
 from prior_reinforce.session.trials import Goal, Log, State, Verdict
+from prior_reinforce.wording import say_place
 
 if TYPE_CHECKING:
     from prior_reinforce.adapters.base import Adapter, Expectation
@@ -187,7 +188,7 @@ class InUse:
             return ""
 
         goal, generator = latest_goal(state).goal, self.generator
-        nearer = f"demonstrate nearer to {np.round(goal, 3).tolist()}"
+        nearer = f"demonstrate nearer to {say_place(goal, self.demonstrations.outcome_format)}"
         try:
             verdict = verdict_on(plan, wanted, self.say_no_plan(state, wanted))
         except RobotLimitError as error:
@@ -215,10 +216,11 @@ class InUse:
     def say_no_plan(self, state: State, condition: Point) -> str:
         """Say for which goal there is no plan, and whether it is simply too far."""
         goal = latest_goal(state).goal
-        place, at = ((np.round(point, 4) + 0.0).tolist() for point in (goal, condition))
+        form = self.demonstrations.outcome_format
+        place, at = (say_place(point, form) for point in (goal, condition))
         said = f"no plan for the goal {place}"
         if at != place:
-            said += f", asked of the generator as {at}"
+            said += f", for which the motion to {at} was to be made"
         if np.any(self.demonstrations.far_outside(goal)):
             said += ", which lies far outside the demonstrations (choose one nearer to them)"
         return said
