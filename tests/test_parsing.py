@@ -107,7 +107,7 @@ def test_a_mere_direction_stands_for_five_centimetres():
 
 def test_what_cannot_be_read_is_named_once():
     with pytest.raises(
-        InvalidFeedbackError, match=r"^cannot read 'a bit long': it has 'a',.*; write"
+        InvalidFeedbackError, match=r"^cannot read 'a bit long': it has 'bit',.*; write"
     ):
         from_words("A bit long", METRES)
 
@@ -115,11 +115,16 @@ def test_what_cannot_be_read_is_named_once():
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ("2 feet long", "it has 'feet', which is no unit (m, cm, mm, in)"),
+        ("2 yards long", "it has 'yards', which is no unit (m, cm, mm, in)"),
+        ("bit short", 'for instance "short" alone, or "5-10cm short"'),
+        ("way too far", 'for instance "long" alone'),
+        ("3 fingers left", 'for instance "left" alone'),
+        ("a hand short", "it has 'hand'"),
+        ("in the hoop", 'or "hit" or "miss"'),
+        ("5cm long, 5cm long", "names long twice"),
         ("half a metre short", "it has 'half', which is no unit"),
-        ("between 3 and 5 cm long", "it has 'between'"),
         ("5cm wide", "it has 'wide', which is no unit .* and no direction"),
-        ("1/2 in long", "write 0.5 for 1/2"),
+        ("1/2/3 in long", "write 0.5 for 1/2"),
     ],
 )
 def test_the_word_that_is_not_known_is_named(words, says):

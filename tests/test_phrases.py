@@ -2,7 +2,8 @@
 
 import pytest
 
-from prior_reinforce.phrases import values_by_name
+from prior_reinforce.parsing import from_words
+from prior_reinforce.phrases import plainer, values_by_name
 
 
 @pytest.mark.parametrize(
@@ -18,3 +19,23 @@ from prior_reinforce.phrases import values_by_name
 )
 def test_values_are_taken_by_their_names(text, values):
     assert values_by_name(text, ("distance", "height")) == values
+
+
+@pytest.mark.parametrize(
+    ("text", "means"),
+    [
+        ("No hit", "miss"),
+        ("did not hit", "miss"),
+        ("about 5cm past the goal", "5cm long"),
+        ("overshoot", "long"),
+        ("between 5 and 7 cm long", "5-7 cm long"),
+        ("between 5cm and 7.5cm long", "5cm-7.5cm long"),
+        ("1 1/2 in short, 1/4 in left", "1.5 in short, 0.25 in left"),
+        ("2 ft short", "24 in short"),
+        ("too far", "far"),
+        ("5cm long, 2 cm left", "5cm long, 2 cm left"),
+    ],
+)
+def test_phrases_are_said_as_words_that_are_read(text, means):
+    assert plainer(text) == means
+    assert from_words(text).said

@@ -147,5 +147,5 @@ def test_one_number_with_a_comma_is_not_two_far_ones():
 
 
 def test_no_empty_example_is_given_of_a_task_that_has_none():
-    with pytest.raises(InvalidFeedbackError, match=r'left, right, or "hit"$'):
+    with pytest.raises(InvalidFeedbackError, match=r'left, right, or "hit" or "miss"$'):
         from_words("green", of("pins", "pins"))

@@ -383,11 +383,14 @@ def _terms(
         elif found.get("word") not in known or (
             place and (not found["value"] or found["sd"] or found["least"])
         ):
-            raise InvalidFeedbackError(say_unread(part, text, [*known], form, place))
+            words = [_SYNONYMS.get(word, word) for word in re.findall("[a-z]+", part)]
+            direction = next((word for word in words if word in known), "")
+            raise InvalidFeedbackError(say_unread(part, text, [*known], form, place, direction))
         else:
             j, pair = known[found["word"]]
         if j in terms:
-            twice = " and ".join(pair or form.names[j])
+            again = terms[j].part.endswith(found.get("word") or " ")
+            twice = found["word"] if again else " and ".join(pair or form.names[j])
             raise InvalidFeedbackError(f"{text!r} names {twice} twice; give each direction once")
         terms[j] = _term(part, found, pair, form.units[j], form.outcome_dim)
         if invented and (size := terms[j].size) is not None:

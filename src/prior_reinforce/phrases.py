@@ -7,11 +7,26 @@ from collections.abc import Sequence
 
 _FILLERS = re.compile(r"\b(?:about|approximately|approx\.?|around|roughly|circa|ca\.?|too)\s+|~\s*")
 """What people say beside a length, which is an estimate anyway."""
+_PHRASES = {
+    re.compile(r"\b(?:no|not a|did(?:n't| not)) hit\b"): "miss",
+    re.compile(r"\bdead on\b"): "on the goal",
+    re.compile(r"\b(?:past the goal|overshoot|overshot)\b"): "long",
+    re.compile(r"\b(?:undershoot|undershot)\b"): "short",
+    re.compile(r"\bbetween\s+([\d.,]+\s*\S*)\s+and\s+(?=[\d.,])"): r"\1-",
+}
+"""What says the same as words that are read."""
+_FRACTION = re.compile(r"(?<![\d.,/])(?:(\d+) +)?(\d)/([1-9])(?![\d/])")
+_FEET = re.compile(r"(\d+(?:\.\d+)?)\s*(?:ft|feet|foot)\b")
+"""Read here only: in the names of recorded channels, `left_foot` and `wrist_ft` are no units."""
 
 
 def plainer(text: str) -> str:
-    """Return a text in lower case, without fillers."""
-    return _FILLERS.sub("", text.strip().lower())
+    """Return a text in lower case, without fillers, and its phrases as words and numbers."""
+    text = _FILLERS.sub("", text.strip().lower())
+    for phrase, words in _PHRASES.items():
+        text = phrase.sub(words, text)
+    text = _FRACTION.sub(lambda n: f"{int(n[1] or 0) + int(n[2]) / int(n[3]):.4g}", text)
+    return _FEET.sub(lambda feet: f"{12 * float(feet[1]):.4g} in", text)
 
 
 def values_by_name(text: str, names: Sequence[str]) -> str | None:

@@ -151,27 +151,38 @@ def place_example(form: OutcomeFormat) -> str:
     )
 
 
-def say_unread(part: str, text: str, known: Sequence[str], form: OutcomeFormat, place: bool) -> str:
-    """Say that a part of a text cannot be read, and what may stand there: one of `known`."""
+def say_unread(
+    part: str, text: str, known: Sequence[str], form: OutcomeFormat, place: bool, direction: str
+) -> str:
+    """Say that a part of a text cannot be read, and what may stand there: one of `known`.
+
+    `direction` is the one of them that the part of an error says; empty if it says none.
+    """
     if place and (from_base := _FROM_BASE.fullmatch(part)):
         return (
             f"{part!r} may be straight to the place or along x only; measure along x and say "
             f"{from_base['length']} {known[0]}"
         )
     example = place_example(form) if place else error_example(form)
-    said = f', for instance "{example}"' * bool(example) + ', or "hit"' * (not place)
+    said = f', for instance "{example}"' * bool(example)
+    if direction and not place:  # how far is what cannot be read
+        said = f', for instance "{direction}" alone'
+        said += f', or "5-10cm {direction}"' * (kind_of(form.units[0]) == "length")
+    elif not place:
+        said += ', or "hit" or "miss"'
     where = "" if part == text.strip().lower() else f" in {text!r}"
     unknown = [
         word
         for word in re.findall(r"[^\W\d_]+", part)
-        if word not in (*known, *SPELT, *form.units, "to", "the", "by")
+        if word not in (*known, *SPELT, *form.units, "a", "an", "to", "the", "by")
     ]
     if unknown:
         kinds = {kind_of(unit) for unit in form.units}
         units = dict.fromkeys([*(each for each in UNITS if kind_of(each) in kinds), *form.units])
         said_units = ", ".join(unit for unit in units if unit != "1")
         listed = f" ({said_units})" if said_units else ""
-        where += f": it has {unknown[0]!r}, which is no unit{listed} and no direction"
+        those = " and ".join(map(repr, unknown))
+        where += f": it has {those}, which is no unit{listed} and no direction"
     elif "/" in part:
         where += ": write 0.5 for 1/2"
     words = f"a length and one of {', '.join(known)}" if known else "a number and its unit"
