@@ -163,3 +163,11 @@ def test_a_number_alone_may_be_the_trial_or_what_was_seen(run, line, number, wha
     assert status == 2
     assert what in err
     assert run("tell", line, 1, number)[0] == 0
+
+
+def test_a_trial_that_was_voided_by_mistake_is_told_again(run, line):
+    run("tell", line, 1, "5cm long")
+    assert "amend it to tell it again" in run("void", line, 1)[1]
+    assert "trial 1, corrected: 5cm long" in run("amend", line, 1, "5cm long")[1]
+    run("ask", line)
+    assert "amend" not in run("void", line, 2)[1]

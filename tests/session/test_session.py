@@ -112,6 +112,23 @@ def test_ask_is_idempotent_until_voided_and_a_void_trial_is_not_data(session):
     assert session.trials[0].note == "ball slipped"
 
 
+def test_a_told_trial_that_was_voided_by_mistake_is_told_again_by_amending_it(session):
+    session.ask()
+    session.tell(1, [0.05, 0.0])
+    session.ask()
+    session.void(1, "slip")
+    session.amend(1, [0.05, 0.0])
+    first, waiting = session.trials
+    assert (first.stage, first.note) == (Stage.TOLD, "")
+    np.testing.assert_array_equal(first.error_seen, [0.05, 0.0])
+    session.void(2)
+    again = session.ask()
+    np.testing.assert_array_equal(again.condition, waiting.condition)  # planned from the same
+    session.void(3)
+    with pytest.raises(TrialStateError, match="only a told trial"):
+        session.amend(3, [0.0, 0.0])
+
+
 def test_hit_as_seen_overrides_the_judgement_by_error(session):
     session.ask()
     session.tell(1, [0.0, 0.0], hit=False)

@@ -94,7 +94,7 @@ class Tell(Seen):
 
 @dataclass(frozen=True)
 class Amend(Seen):
-    """Correct what was told of a trial, of any goal.
+    """Correct what was told of a trial, of any goal; one that was voided since counts again.
 
     For example:
         prior-reinforce amend hoop 3 "5cm short"
@@ -130,7 +130,8 @@ class Void(OnWorkspace):
             raise ConfigurationError(f"unexpected {rest[0]!r}; say why with --reason")
         trial = workspace.session().void(number, self.reason)
         now = workspace.standing
-        print(f"trial {trial.number}: {say_trial(now, trial)}; nothing is learned from it")
+        undo = "; amend it to tell it again" if trial.told_before else ""
+        print(f"trial {trial.number}: {say_trial(now, trial)}; nothing is learned from it{undo}")
         print(*say_outdated(now.state), f"next: {next_step(now)}", sep="\n")
 
 

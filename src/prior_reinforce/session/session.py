@@ -257,10 +257,8 @@ class Session:
         with self._exclusive() as state:
             trial = state.trial(number)
             if not trial.open:
-                raise TrialStateError(
-                    f"trial {number} is already {trial.stage.value}; "
-                    + ("amend it to correct it" if trial.stage is Stage.TOLD else "ask for another")
-                )
+                remedy = "amend it to correct it" if trial.amendable else "ask for another"
+                raise TrialStateError(f"trial {number} is already {trial.stage.value}; {remedy}")
             self._check(trial, "tell")
             self._append_reading(Told, trial, state.goal_of(trial), seen, hit)
         return state.trial(number)
@@ -268,7 +266,7 @@ class Session:
     def amend(
         self, number: int, seen: Reading | ArrayLike | None = None, *, hit: bool | None = None
     ) -> Trial:
-        """Correct what was told of a trial, of any goal.
+        """Correct what was told of a trial, of any goal; one that was voided since counts again.
 
         An open trial keeps the plan it has, and says so (`Trial.outdated`).
 
@@ -280,7 +278,7 @@ class Session:
         """
         with self._exclusive() as state:
             trial = state.trial(number)
-            if trial.stage is not Stage.TOLD:
+            if not trial.amendable:
                 raise TrialStateError(
                     f"trial {number} is {trial.stage.value}, only a told trial can be amended; "
                     + ("tell it" if trial.open else "ask for another")

@@ -106,6 +106,8 @@ class Trial:
     """Whether the goal was reached: as seen, or judged from `error_seen`."""
     note: str = ""
     """Why it was voided."""
+    told_before: bool = False
+    """Whether it is voided, and was told until then: a person may have meant another trial."""
     outdated: bool = False
     """Whether a reading that it was planned from was amended or voided while it waited."""
     p_hit: float | None = None
@@ -165,6 +167,11 @@ class Trial:
     def open(self) -> bool:
         """Whether the trial still waits to be told or voided."""
         return self.stage is Stage.ASKED
+
+    @property
+    def amendable(self) -> bool:
+        """Whether it was told, be it voided since, so that this can be corrected."""
+        return self.stage is Stage.TOLD or self.told_before
 
 
 class State:
@@ -289,7 +296,7 @@ class State:
                 number, goal = known.pop("trial"), known.pop("goal")
                 self.trials.append(Trial(number, goal, asked_at=time, **known))
             case Amended():
-                if self.trial(event.trial).stage is not Stage.TOLD:
+                if not self.trial(event.trial).amendable:
                     raise ValueError(f"trial {event.trial} has not been told")
                 self._correct(self._told(event, time))
             case Told():
@@ -297,8 +304,9 @@ class State:
                     raise ValueError(f"trial {event.trial} is not open")
                 self.trials[event.trial - 1] = self._told(event, time)
             case Voided():
-                void = replace(self.trial(event.trial), stage=Stage.VOIDED, note=event.reason)
-                self._correct(replace(void, reading=None, hit=False, told_at=""))
+                trial = self.trial(event.trial)
+                void = replace(trial, stage=Stage.VOIDED, told_before=trial.amendable)
+                self._correct(replace(void, note=event.reason, reading=None, hit=False, told_at=""))
             case _:
                 raise ValueError("no event of a session")
 
@@ -307,7 +315,8 @@ class State:
         reading = Reading.from_record(event.reading)
         if reading.error_seen.size != self.goal_of(trial).goal.size:
             raise InvalidFeedbackError("the reading has another number of components than the goal")
-        return replace(trial, stage=Stage.TOLD, reading=reading, hit=event.hit, told_at=time)
+        told = replace(trial, stage=Stage.TOLD, told_before=False, note="", told_at=time)
+        return replace(told, reading=reading, hit=event.hit)
 
     def _correct(self, corrected: Trial) -> None:
         """Replace a trial, and mark the open one if it was planned from what is corrected now."""
@@ -316,7 +325,10 @@ class State:
             waiting is not None
             and not before.open
             and _meaning(before) != _meaning(corrected)
-            and _teaches(before, self.goal_of(waiting), waiting.model)
+            and any(
+                _teaches(trial, self.goal_of(waiting), waiting.model)
+                for trial in (before, corrected)
+            )
         ):
             self.trials[waiting.number - 1] = replace(waiting, outdated=True)
         self.trials[corrected.number - 1] = corrected
