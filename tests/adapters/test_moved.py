@@ -320,6 +320,19 @@ def test_no_condition_that_missed_by_so_much_is_asked_again():
     assert apart[np.triu_indices(8, 1)].min() > 0.4 * TOLERANCE[0]
 
 
+def test_a_change_is_named_by_how_many_outcomes_lie_elsewhere_unless_it_was_announced():
+    arm = Arm()
+    arm.adapter.change_hardware()
+    arm.throw(GOALS[0])
+    assert "elsewhere" not in arm.adapter.expect(GOALS[0], GOALS[0], TOLERANCE).remark
+    for goal in GOALS[1:4]:
+        arm.throw(goal)
+    arm.moved = np.array([0.3, -0.2])
+    for goal in (*GOALS[4:], GOALS[0]):
+        arm.throw(goal)
+    assert "the last 3 outcomes" in arm.adapter.expect(GOALS[0], GOALS[0], TOLERANCE).remark
+
+
 def test_a_goal_farther_than_motions_can_be_moved_is_named():
     adapter, far = Arm().adapter, np.array([4.0, 0.0])
     condition = adapter.propose(far)

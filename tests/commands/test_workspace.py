@@ -144,6 +144,14 @@ def test_a_goal_in_centimetres_without_a_unit_is_refused(run, folder):
         assert not workspace.session().goals
 
 
+def test_a_refused_new_workspace_is_no_line_of_a_file_that_was_not_made(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    status, _, err = run("new", "hoop", "--symmetry", "carried")
+    assert status == 2
+    assert "nothing was made: [symmetry] object = 'carried'" in err
+    assert "--no-box" in err
+
+
 def test_a_person_at_the_terminal_is_asked_which_link_is_the_flange(run, tmp_path, monkeypatch):
     so101 = Urdf("so101", [*arm(["a", "b", "wrist"]), J("gripper", "jaw")])
     (tmp_path / "arm.urdf").write_text(so101.text())

@@ -161,9 +161,13 @@ class MovedTrials:
             return f"outcomes follow the symmetry ({symmetry.name}) the other way round"
         if self.doubted:
             return f"outcomes do not follow the symmetry ({symmetry.name}): is it the right one?"
-        if belief.hypotheses[0].changes:
-            since = belief.hypotheses[0].changes[-1].since
-            return f"since trial {since + 1} outcomes lie elsewhere: was something moved?"
+        found = [change.since for change in belief.hypotheses[0].changes if change.shift_sd]
+        if found:  # others were announced; those that were lost have no number here
+            n = self.now - found[-1]
+            which = (
+                f"the last {n} outcomes that were seen lie" if n > 1 else "the last outcome lies"
+            )
+            return f"{which} elsewhere: was something moved?"
         return ""
 
     def _beyond(self, goal: Point) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import sys
 from dataclasses import dataclass, replace
 from functools import partial
@@ -20,7 +21,7 @@ from prior_reinforce.arm.robots.presets import PRESETS
 from prior_reinforce.arm.robots.urdf import bases_on_axis
 from prior_reinforce.arm.workspace.declared import WAYS, read_object
 from prior_reinforce.arm.workspace.folder import require_new
-from prior_reinforce.arm.workspace.manifest import Manifest
+from prior_reinforce.arm.workspace.manifest import MANIFEST_FILE, Manifest
 from prior_reinforce.arm.workspace.template import NewWorkspace
 from prior_reinforce.arm.workspace.view import trials_table
 from prior_reinforce.arm.workspace.workspace import Workspace
@@ -71,7 +72,12 @@ class New(NewWorkspace):
                 "no answer came, and nothing was made; answer, or say --symmetry, --box and --tip"
             ) from error
         text = asked.manifest(self.folder.resolve().name)
-        with Workspace.create(self.folder, text) as workspace:
+        try:
+            workspace = Workspace.create(self.folder, text)
+        except ConfigurationError as error:  # whose place is in a file that is not made
+            place = re.compile(rf"{re.escape(str(self.folder / MANIFEST_FILE))}(:\d+)?: ")
+            raise ConfigurationError(f"nothing was made: {place.sub('', str(error))}") from error
+        with workspace:
             print(f"workspace made in {self.folder}; look through {self.folder / 'workspace.toml'}")
             if workspace.manifest.robot is not None:
                 print(_say_robot(workspace.manifest.robot))
