@@ -152,6 +152,14 @@ def test_a_refused_new_workspace_is_no_line_of_a_file_that_was_not_made(run, tmp
     assert "--no-box" in err
 
 
+def test_of_a_motion_along_a_line_it_is_said_how_it_is_moved(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    rail = ("--robot", "none", "--action-names", "rail", "--action-units", "m")
+    of_line = ("--outcome-names", "distance", "--symmetry", "none")
+    out = run("new", "line", *rail, *of_line)[1]
+    assert "the motion is played faster or slower; one demonstration is enough" in out
+
+
 def test_a_person_at_the_terminal_is_asked_which_link_is_the_flange(run, tmp_path, monkeypatch):
     so101 = Urdf("so101", [*arm(["a", "b", "wrist"]), J("gripper", "jaw")])
     (tmp_path / "arm.urdf").write_text(so101.text())

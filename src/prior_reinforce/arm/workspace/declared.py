@@ -15,7 +15,7 @@ WAYS = {
     "carried": "the arm carries the object until it leaves: turned about the base",
     "X Y": "the object lies at this place, to be pushed or struck: turned about it",
     "anywhere": "the motion may happen anywhere on the table: shifted (poses alone)",
-    "none": "neither",
+    "none": "neither; along one line, the motion is played faster or slower",
 }
 """What may be said of the object, and what follows."""
 
