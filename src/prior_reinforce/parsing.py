@@ -383,8 +383,8 @@ def _terms(
         elif found.get("word") not in known or (
             place and (not found["value"] or found["sd"] or found["least"])
         ):
-            words = [_SYNONYMS.get(word, word) for word in re.findall("[a-z]+", part)]
-            direction = next((word for word in words if word in known), "")
+            said = [_SYNONYMS.get(word, word) for word in re.findall("[a-z]+", part)]
+            direction = next((word for word in said if word in known), "")
             raise InvalidFeedbackError(say_unread(part, text, [*known], form, place, direction))
         else:
             j, pair = known[found["word"]]
