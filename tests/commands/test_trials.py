@@ -193,7 +193,7 @@ def test_a_command_that_fails_is_told_by_the_status(run, folder, tmp_path):
     assert status == 1
     assert "moved .npz" in out
     assert "ended with status 3" in err
-    assert "next: prior-reinforce void planar 1" in out
+    assert "next: if it moved: prior-reinforce void planar 1" in out
     status, out, err = run("ask", folder, "--yes", "--run", f"python3 {script} {{plan}} 0")
     assert status == 2
     assert "a plan runs once" in err
