@@ -21,7 +21,7 @@ HEAVY = {
     "matplotlib",
     "joblib",
     "imageio_ffmpeg",
-    "httpx",
+    "openai",
     "scipy.interpolate",
     "scipy.special",
     "scipy.optimize",

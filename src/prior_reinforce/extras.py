@@ -18,6 +18,7 @@ EXTRA_OF = {
     "joblib": "simulation",
     "threadpoolctl": "simulation",
     "imageio_ffmpeg": "simulation",
+    "openai": "vlm",
     "httpx": "vlm",
     "pyarrow": "lerobot",
     "rosbags": "ros",

@@ -66,7 +66,7 @@ def test_names_of_members_load_none_of_them():
         "from prior_reinforce.perception import PERCEPTIONS\n"
         "from prior_reinforce.simulation.tasks import TASKS\n"
         "print(ADAPTERS.help, PERCEPTIONS.help, TASKS.help)\n"
-        "heavy = {'torch', 'mujoco', 'httpx', 'scipy', 'numpy', 'joblib', 'PIL', 'msgspec'}\n"
+        "heavy = {'torch', 'mujoco', 'openai', 'scipy', 'numpy', 'joblib', 'PIL', 'msgspec'}\n"
         "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)

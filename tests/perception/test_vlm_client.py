@@ -17,7 +17,6 @@ from hypothesis import strategies as st
 
 from prior_reinforce.environment import Rollout
 from prior_reinforce.errors import ConfigurationError, EndpointError
-from prior_reinforce.perception import vlm_client
 from prior_reinforce.perception.vlm_client import OpenAIClient, VisionLanguageModelConfig
 from tests.perception.slanted_table import BALL, GOAL
 from tests.perception.vision_server import VisionServer
@@ -73,19 +72,6 @@ def test_a_lasting_failure_asks_the_operator(
     assert "the orange ball" in str(failure.value)
     assert "ask the operator" in str(failure.value)
     assert "\n" not in str(failure.value)
-
-
-@pytest.mark.parametrize(("says", "pauses"), [({}, [0.5, 1.0]), ({"Retry_After": 7}, [7.0, 7.0])])
-def test_a_repetition_waits_for_longer_each_time_or_as_the_server_says(says, pauses, monkeypatch):
-    waited = []
-    monkeypatch.setattr(vlm_client.time, "sleep", waited.append)
-    content = body({}, **says).replace(b"200 OK", b"503 Busy")
-    with (
-        endpoint(lambda file: file.write(content)) as (address, requests),
-        pytest.raises(EndpointError, match="HTTP 503"),
-    ):
-        ask(address, max_retries=2)
-    assert (waited, len(requests)) == (pauses, 3)
 
 
 def test_no_server_at_all_asks_the_operator(looking, picture):

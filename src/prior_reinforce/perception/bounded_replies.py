@@ -2,51 +2,82 @@
 
 from __future__ import annotations
 
-from concurrent.futures import Future, TimeoutError
+from collections.abc import Callable
+from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import Any
 
 import httpx
+import openai
 
 from prior_reinforce.errors import EndpointError
 
 
-def post(
-    client: httpx.Client, url: str, content: Any, *, seconds: float, most_bytes: int
-) -> tuple[httpx.Response, bytes]:
-    """Send JSON, and read the whole answer, which httpx bounds from one byte to the next only.
+class BoundedClient(openai.DefaultHttpxClient):
+    """Reads every answer itself, errors included, within a time and up to a size.
 
-    Args:
-        client: Who sends.
-        url: Where to.
-        content: Of JSON types.
-        seconds: From the request to the end of its answer, at most.
-        most_bytes: Of the answer, unpacked.
-
-    Returns:
-        The answer's head and its content, whatever its status.
-
-    Raises:
-        httpx.ReadTimeout: It took longer.
-        EndpointError: It is larger.
+    httpx has a timeout from one byte to the next, and no largest size.
     """
-    answer: Future[tuple[httpx.Response, bytes]] = Future()
 
-    def read() -> None:
+    def __init__(self, seconds: float, most_bytes: int, **settings: Any) -> None:
+        """Connect to nothing yet.
+
+        Args:
+            seconds: From the request to the end of its answer.
+            most_bytes: Of an answer, unpacked.
+            settings: Of `httpx.Client`.
+        """
+        super().__init__(**settings)
+        self._seconds, self._most = seconds, most_bytes
+
+    def send(  # type: ignore[override]
+        self, request: httpx.Request, **how: Any
+    ) -> httpx.Response:
+        """Send a request; what it raises is also raised for an answer beyond a bound.
+
+        Raises:
+            httpx.ReadTimeout: It took longer.
+            EndpointError: It is larger.
+        """
+        answers: SimpleQueue[httpx.Response | Exception] = SimpleQueue()
+        send = super().send
+        # Nothing interrupts a socket from which a byte comes now and then; so it is left behind.
+        Thread(target=self._answer, args=(send, request, how, answers), daemon=True).start()
         try:
-            said = bytearray()
-            with client.stream("POST", url, json=content) as response:
-                for part in response.iter_bytes():
-                    said += part
-                    if len(said) > most_bytes:
-                        raise EndpointError(f"an answer of more than {most_bytes} bytes")
-            answer.set_result((response, bytes(said)))
-        except Exception as error:
-            answer.set_exception(error)
+            answer = answers.get(timeout=self._seconds)
+        except Empty:
+            raise httpx.ReadTimeout("the answer takes longer", request=request) from None
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
 
-    # Nothing interrupts a socket from which a byte comes now and then; so it is left behind.
-    Thread(target=read, daemon=True).start()
-    try:
-        return answer.result(seconds)
-    except TimeoutError:
-        raise httpx.ReadTimeout("the answer takes longer") from None
+    def _answer(
+        self,
+        send: Callable[..., httpx.Response],
+        request: httpx.Request,
+        how: dict[str, Any],
+        answers: SimpleQueue[httpx.Response | Exception],
+    ) -> None:
+        try:
+            response = send(request, **how | {"stream": True})
+            try:
+                content = bytearray()
+                for part in response.iter_bytes():
+                    content += part
+                    if len(content) > self._most:
+                        raise EndpointError(f"an answer of more than {self._most} bytes")
+            finally:
+                response.close()
+        except Exception as error:
+            answers.put(error)
+            return
+        kept = [
+            (name, value)
+            for name, value in response.headers.multi_items()
+            if name not in ("content-encoding", "content-length", "transfer-encoding")
+        ]
+        answers.put(
+            httpx.Response(
+                response.status_code, headers=kept, content=bytes(content), request=request
+            )
+        )

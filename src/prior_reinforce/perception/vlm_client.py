@@ -6,7 +6,6 @@ import base64
 import io
 import os
 import ssl
-import time
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,11 +23,7 @@ from prior_reinforce.perception.vlm_reading import Answer
 from prior_reinforce.registry import build
 from prior_reinforce.settings import Checked, Count, NonNegative, Positive, tomllib
 
-_RETRIED = (408, 409, 429)
-"""HTTP statuses, and all from 500 on, after which a request is repeated."""
-_FIRST_PAUSE, _LONGEST_PAUSE, _LONGEST_ASKED = 0.5, 8.0, 60.0
-"""Before the first repetition, doubled for the next; at most; and at most where the server says how
-long, in [s] (ours)."""
+_NO_KEY = "EMPTY"
 _MOST_SHOWN = 160
 """Characters of a server's own words in a message."""
 _MOST_BYTES, _BYTES_A_TOKEN = 65_536, 100
@@ -181,11 +176,13 @@ class OpenAIClient:
             MissingExtraError: The extra [vlm] is not installed.
             ConfigurationError: The variable that should hold the key is not set.
         """
-        check_installed("httpx")
-        import httpx
+        check_installed("openai")
+        import openai
+
+        from prior_reinforce.perception.bounded_replies import BoundedClient
 
         self.config, self.model = config, config.model
-        self._key = ""
+        self._key = _NO_KEY  # the client insists on one; servers that want none take any
         if config.api_key_variable is not None:
             self._key = os.environ.get(config.api_key_variable, "")
             if not self._key:
@@ -202,9 +199,9 @@ class OpenAIClient:
         self._proxied = urlsplit(config.base_url).hostname not in _THIS_MACHINE
         own = config.certificate
         try:
-            self._client = httpx.Client(
-                headers={"Authorization": f"Bearer {self._key}"} if self._key else {},
-                timeout=config.timeout,
+            http = BoundedClient(
+                config.timeout,
+                _MOST_BYTES + _BYTES_A_TOKEN * config.max_tokens,
                 verify=ssl.create_default_context(cafile=own) if own else True,
                 trust_env=self._proxied,
                 # A redirection would send the picture, and maybe the key, somewhere else.
@@ -223,9 +220,13 @@ class OpenAIClient:
                 f"{' or '.join(_proxies())} in the environment names a proxy that is not "
                 f"understood ({error}); unset it, or for socks5: pip install 'httpx[socks]'"
             ) from error
-        address = httpx.URL(config.base_url)
-        path = address.path.rstrip("/") + "/chat/completions"
-        self._url = str(address.copy_with(path=path, fragment=None))
+        self._client = openai.OpenAI(
+            base_url=config.base_url,
+            api_key=self._key,
+            timeout=config.timeout,
+            max_retries=config.max_retries,
+            http_client=http,
+        )
         self._sent: tuple[object, str] = (None, "")
 
     def ask(self, words: str, picture: Picture) -> Answer:
@@ -233,31 +234,27 @@ class OpenAIClient:
         if self._sent[0] is not picture:  # the same picture is asked about several times
             self._sent = (picture, _png_address(picture))
         prompt = FORMATS[self.config.family].prompt.format(words=words)
-        asked = [
+        asked: list[Any] = [
             {"type": "image_url", "image_url": {"url": self._sent[1]}},
             {"type": "text", "text": prompt},
         ]
         more = {
             "temperature": self.config.temperature,
             "max_tokens": self.config.max_tokens,
-            **_server_fields(self.config),
+            **_extra_body(self.config),
         }
-        request = {
-            "model": self.config.model,
-            "messages": [{"role": "user", "content": asked}],
-            **{k: v for k, v in more.items() if k not in self.config.leave_out},
-        }
+        content = b""
         try:
-            status, content = self._posted(request)
-        except Exception as error:
-            raise EndpointError(self._what_failed(error)) from None
-        try:
-            if not 200 <= status < 300:
-                raise EndpointError(f"HTTP {status}")
+            response = self._client.chat.completions.with_raw_response.create(
+                model=self.config.model,
+                messages=[{"role": "user", "content": asked}],
+                extra_body={k: v for k, v in more.items() if k not in self.config.leave_out},
+            )
+            content = response.content
             choice = msgspec.json.decode(content, type=_Completion).choices[0]
-        # Whatever a server sends is no reason to break off.
+        # Whatever a server sends, the client's parsing included, is no reason to break off.
         except Exception as error:
-            raise EndpointError(self._what_is_said(status, content, error)) from None
+            raise EndpointError(self._what_failed(error, content)) from None
         message, reason = choice.message, choice.finish_reason
         thinking = message.reasoning_content or message.reasoning
         return Answer(
@@ -272,7 +269,7 @@ class OpenAIClient:
 
     def _hidden(self, text: str) -> str:
         """A text without the key and its parts, which a server may send back."""
-        if not self._key:
+        if self._key == _NO_KEY:
             return text
         n = min(len(self._key), _HIDDEN)
         parts = {self._key[at : at + n] for at in range(len(self._key) - n + 1)}
@@ -282,91 +279,64 @@ class OpenAIClient:
                 shown, begin = f"{shown}{text[begin:at]}***" if at >= begin else shown, at + n
         return shown + text[begin:]
 
-    def _posted(self, request: Any) -> tuple[int, bytes]:
-        """Status and content of the answer, after as many repetitions as there may be."""
-        import httpx
+    def _what_failed(self, error: Exception, content: bytes) -> str:
+        """One line with the server's own words and the remedy, whatever way a request fails.
 
-        from prior_reinforce.perception.bounded_replies import post
+        The content is that of an answer with HTTP 200, which is no completion.
+        """
+        import openai
 
-        most = _MOST_BYTES + _BYTES_A_TOKEN * self.config.max_tokens
-        bounds: Any = {"seconds": self.config.timeout, "most_bytes": most}
-        for done in range(self.config.max_retries + 1):
-            pause = min(_FIRST_PAUSE * 2**done, _LONGEST_PAUSE)
-            last = done == self.config.max_retries
-            try:
-                response, content = post(self._client, self._url, request, **bounds)
-            except httpx.TransportError:
-                if last:
-                    raise
-            else:
-                status, asked = response.status_code, response.headers.get("retry-after", "")
-                if last or not (status in _RETRIED or status >= 500):
-                    break
-                if asked.isdecimal():
-                    pause = min(float(asked), _LONGEST_ASKED)
-            time.sleep(pause)
-        return status, content
-
-    def _what_failed(self, error: Exception) -> str:
-        """One line with why no answer came, and the remedy."""
-        import httpx
-
-        url, tries = without_secrets(self.config.base_url), self._tries
-        if isinstance(error, httpx.TimeoutException):
-            return f"no answer from {url} in {self.config.timeout:g} s {tries}; raise timeout"
-        if isinstance(error, EndpointError):
-            return f"{url} sends {error}; raise max_tokens if it is meant to"
-        said = self._shown(str(error) or type(error).__name__)
-        remedy = "is the server running? is the address right, http or https?"
-        if "CERTIFICATE" in said:
-            remedy = "give the server's own certificate, a .pem file, as certificate"
-        elif self._proxied and _proxies():
-            remedy += f" {' or '.join(_proxies())} sets a proxy"
-        return f"cannot reach {url} {tries} ({said}); {remedy}"
-
-    def _what_is_said(self, status: int, content: bytes, error: Exception) -> str:
-        """One line with the server's own words and the remedy, where they are no completion."""
-        config, url = self.config, without_secrets(self.config.base_url)
-        words, named = _words_of(content)
-        said = self._shown(words or str(error))
-        if 200 <= status < 300 and named:
+        config = self.config
+        url, tries = without_secrets(config.base_url), f"after {config.max_retries + 1} tries"
+        said, refused = self._words_of(error, content)
+        if isinstance(error, openai.APITimeoutError):
+            return f"no answer from {url} in {config.timeout:g} s {tries}; raise timeout"
+        for each in (error, error.__cause__):  # which of them depends on the client's version
+            if isinstance(each, EndpointError):
+                return f"{url} sends {each}; raise max_tokens if it is meant to"
+        if isinstance(error, openai.APIConnectionError):
+            remedy = "is the server running? is the address right, http or https?"
+            if "CERTIFICATE" in said:
+                remedy = "give the server's own certificate, a .pem file, as certificate"
+            elif self._proxied and _proxies():
+                remedy += f" {' or '.join(_proxies())} sets a proxy"
+            return f"cannot reach {url} {tries} ({said}); {remedy}"
+        if refused and content:
             return f"{url} refuses with HTTP 200: {said}; see to the account, or the server's log"
-        if 200 <= status < 300:
+        if not isinstance(error, openai.APIStatusError):
             return (
                 f"{url} answers, but not with a chat completion ({said}); the address of an "
                 "OpenAI-compatible endpoint mostly ends in /v1"
             )
-        what, remedy = f"failed with HTTP {status}", "see the server's log"
-        if status == 429:
-            what = f"refuses more requests for now (HTTP 429) {self._tries}"
+        what, remedy = f"failed with HTTP {error.status_code}", "see the server's log"
+        if error.status_code == 429:
+            what = f"refuses more requests for now (HTTP 429) {tries}"
             remedy = "wait a minute, or see to the account's quota"
-        elif status == 401:
+        elif error.status_code == 401:
             what, remedy = "refuses the key (HTTP 401)", "set api_key_variable"
-        elif status == 404:
+        elif error.status_code == 404:
             what = f"does not serve model '{config.model}' (HTTP 404)"
             remedy = "set base_url and model"
         elif fields := [field for field in _FIELDS if field in said]:
             remedy = f"where a field is not supported, set leave_out = {fields}"
         return f"{url} {what}: {said}; {remedy}"
 
-    @property
-    def _tries(self) -> str:
-        return f"after {self.config.max_retries + 1} tries"
-
-    def _shown(self, words: str) -> str:
-        """Words in one line; the key is hidden before anything is cut, or its rest would stay."""
-        return " ".join(self._hidden(words).split())[:_MOST_SHOWN]
-
-
-def _words_of(content: bytes) -> tuple[str, bool]:
-    """What a server says in an answer that is no completion; whether it names an error."""
-    body: object = None
-    with suppress(ValueError, RecursionError):
-        body = msgspec.json.decode(content)
-    named = body.get("error") or body if isinstance(body, dict) else None
-    if isinstance(named, dict):
-        named = named.get("message") or named.get("detail")
-    return str(named or content.decode(errors="replace")), bool(named)
+    def _words_of(self, error: Exception, content: bytes) -> tuple[str, bool]:
+        """What the server, or the network, says of a failure; whether the server names an error."""
+        body, response = getattr(error, "body", None), getattr(error, "response", None)
+        words: object = content.decode(errors="replace") or error.__cause__ or error
+        with suppress(ValueError, RecursionError):
+            body = msgspec.json.decode(content) if content else body
+        named = body.get("error") or body if isinstance(body, dict) else body
+        if isinstance(named, dict):
+            named = named.get("message") or named.get("detail")
+        if isinstance(body, dict):
+            words = named or words
+        elif response is not None:
+            words = response.text or words
+        # The key is hidden before anything is cut: the rest of it would be no longer found.
+        said = " ".join(self._hidden(str(words) or type(words).__name__).split())
+        return said[:_MOST_SHOWN], isinstance(body, dict) and bool(named)
 
 
 def _proxies() -> list[str]:
@@ -382,7 +352,7 @@ def _png_address(picture: Picture) -> str:
     return f"data:image/png;base64,{base64.b64encode(data.getvalue()).decode()}"
 
 
-def _server_fields(config: VisionLanguageModelConfig) -> dict[str, Any]:
+def _extra_body(config: VisionLanguageModelConfig) -> dict[str, Any]:
     if config.server == "vllm":
         # The markers around the box are special tokens, which vLLM strips unless told otherwise.
         thinking = {"enable_thinking": config.enable_thinking}
