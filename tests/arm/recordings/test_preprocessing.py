@@ -65,6 +65,20 @@ def test_still_ends_go_and_a_margin_stays():
         )
 
 
+@pytest.mark.parametrize("seconds", [1.5, 3.0])
+def test_nothing_of_a_soft_start_or_end_is_cut(seconds):
+    """Half a per cent of the motion is passed later than the margin behind its beginning."""
+    t = np.arange(round((1.6 + seconds) * 100)) / 100
+    s = np.clip((t - 0.8) / seconds, 0, 1)[:, None]
+    q = SWING * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    done = preprocess([recording(t, q)], UNITS, Preprocessing())
+    (start,), (end,) = done.starts, done.ends
+    speed = np.abs(np.gradient(q, t, axis=0)).max(axis=1)
+    assert max(speed[(t < start) | (t > end)]) <= 0.003 * speed.max()
+    assert 0.7 <= start <= 0.8 + 0.01 * seconds
+    assert 0.8 + 0.99 * seconds <= end <= 0.9 + seconds
+
+
 def test_encoder_noise_is_no_motion():
     rng = np.random.default_rng(0)
     noisy = []

@@ -18,10 +18,10 @@ from prior_reinforce.arm.recordings.leaps import refuse_leaps
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.time_finder import LONGEST
 from prior_reinforce.arm.recordings.units import say_names
-from prior_reinforce.arrays import Frames, Plans, Point
+from prior_reinforce.arrays import Frames, Plans
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.plans.signals import Signals, analyse, moving_ends, moving_rows
-from prior_reinforce.plans.speeds import Channels
+from prior_reinforce.plans.speeds import Channels, largest_of_unit
 from prior_reinforce.settings import Checked, NonNegative, Positive
 
 _ON_GRID = 0.02
@@ -30,8 +30,11 @@ _ON_GRID = 0.02
 _OVERSHOOT = 0.01
 """A spline that leaves a channel's recorded range by more than this share of it is refused."""
 _NOISE_OVERSHOOT = 5.0
-"""And by more than so many standard deviations of its noise: splines leave the range of noise by
-about as much as there is noise. Ours."""
+"""And by more than so many standard deviations of its noise, as a step that is motion has to be:
+splines leave the range of noise by about as much as there is noise. Ours."""
+_BEGINS = 1e-3
+"""Part of the fastest step of its unit above which a channel leaves its rest, noise aside. Ours: a
+plan that begins a little faster leaps from rest, and breaks limits of jerk."""
 _WHOLE_RATE = 0.005
 """A median period this share from a whole rate is that rate. Ours: clocks drift by less."""
 _GAP = 3
@@ -114,7 +117,7 @@ def preprocess(
     signals = analyse(every, units, float(np.median([r.period for r in recordings])))
     spans = [(0.0, r.duration) for r in recordings]
     if settings.trim:
-        spans = [_moving_span(r, signals.trim_band, settings.margin) for r in recordings]
+        spans = [_moving_span(r, units, signals, settings.margin) for r in recordings]
     sampled = [_resample(r, *s, dt, signals) for r, s in zip(recordings, spans, strict=True)]
     pieces, changes = [piece for piece, _ in sampled], None
     if settings.smooth is not None:
@@ -327,19 +330,28 @@ def _common_dt(recordings: Sequence[Recording]) -> float:
     return 1 / rate if rate > 0 and abs(rate * period - 1) < _WHOLE_RATE else period
 
 
-def _moving_span(recording: Recording, still: Point, margin: float) -> tuple[float, float]:
+def _moving_span(
+    recording: Recording, units: tuple[str, ...], signals: Signals, margin: float
+) -> tuple[float, float]:
     """From when to when a recording is kept, in [s]: its motion and a margin."""
-    t, rows = recording.times, moving_rows(recording.positions, still)
+    t, rows = recording.times, moving_rows(recording.positions, signals.trim_band)
     if rows is None:
         raise InvalidDemonstrationsError(
-            f"episode {recording.episode} never moves by more than {still.max():.2g} from its "
-            "first pose; leave it out, or import without trimming"
+            f"episode {recording.episode} never moves by more than {signals.trim_band.max():.2g} "
+            "from its first pose; leave it out, or import without trimming"
         )
     # The last frame within the still band before the motion, and the first one after it.
     before, after = rows[0] - 1, min(rows[1] + 1, len(t) - 1)
-    first = np.searchsorted(t, t[before] - margin, side="right") - 1
-    last = np.searchsorted(t, t[after] + margin)
-    return float(t[max(first, 0)]), float(t[min(last, len(t) - 1)])
+    first = max(int(np.searchsorted(t, t[before] - margin, side="right")) - 1, 0)
+    last = min(int(np.searchsorted(t, t[after] + margin)), len(t) - 1)
+    # A long soft start or end is within the band for longer than the margin, and yet no rest.
+    steps = np.abs(np.diff(recording.positions, axis=0))
+    slow = _BEGINS * largest_of_unit(steps.max(axis=0), units)
+    at_rest = (steps <= np.maximum(slow, _NOISE_OVERSHOOT * signals.noise)) | signals.held
+    rests = np.flatnonzero(np.all(at_rest, axis=1))
+    first = min(first, int(np.max(rests[rests < before], initial=-1)) + 1)
+    last = max(last, int(np.min(rests[rests >= after], initial=len(t) - 1)))
+    return float(t[first]), float(t[last])
 
 
 def _resample(
