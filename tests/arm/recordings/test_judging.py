@@ -99,3 +99,20 @@ def test_a_unit_of_two_words_is_one_word_of_the_command_that_is_printed():
     ends = (0.4, -1.6, 220)
     told = select(takes(("j1", "j2", "robotiq_pos"), ends, units=[("0.01 deg", None, None)]))
     assert {one.option for one in told.ambiguities} == {"--units '0.01 deg' rad UNIT"}
+
+
+@pytest.mark.parametrize("most", [0.8, 1.0, 1.05])
+def test_a_gripper_of_0_to_1_is_asked_about_though_it_reaches_all_of_it(most):
+    names, plan = ("j1", "gripper"), ("rad", "percent")
+    (asked,) = select(takes(names, (1, most)), names, names, plan_units=plan).ambiguities
+    assert asked.option == "--units rad share"
+
+
+def test_radians_in_columns_that_say_degrees_are_remarked_on():
+    found = select(takes(("j1", "j2"), (1.2, -1.6), units=[("deg", "deg")]))
+    assert found.ambiguities == ()
+    (said,) = found.remarks
+    assert "j2 of t0 reaches 1.6 deg, which is hardly a motion (in rad it is one)" in said
+    assert select(takes(("j1", "j2"), (1.2, -16), units=[("deg", "deg")])).remarks == ()
+    place = takes(("x", "y", "z", "yaw"), (0.4, 0.1, 0.2, 2), units=[("m", "m", "m", "deg")])
+    assert select(place).remarks == ()

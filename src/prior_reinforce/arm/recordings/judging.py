@@ -181,10 +181,14 @@ class Judge:
         return Doubt("percent" if one.largest <= 100 else UNIT, f"and {why} it is no angle")
 
     def _hardly_moves(self, one: Belief) -> Doubt | None:
-        """Joints that are all said to be in degrees, and stay within 6.28 of them, are not."""
-        said = self.given == "one for all" and self.silent and one in self.angles
-        small = all(angle.unit == "deg" and angle.largest < TURN["rad"] for angle in self.angles)
-        return Doubt("rad", _HARDLY, asked=True) if said and small else None
+        """Joints that are all said to be in degrees, and stay within 6.28 of them, are not.
+
+        Where a file says so, it is remarked on, at half of that; a place may turn by as little.
+        """
+        said = self.given == "one for all" and self.silent
+        most = TURN["rad"] if said else TURN["rad"] / 2 * (not self.places)
+        small = all(angle.stated == "deg" and angle.largest < most for angle in self.angles)
+        return Doubt("rad", _HARDLY, asked=said) if small and one in self.angles else None
 
     def _is_beyond(self, one: Belief) -> Doubt | None:
         """A number beyond what arms do is in another unit; an angle with those that share it."""
@@ -273,12 +277,13 @@ class Judge:
     def remarks(self) -> tuple[list[str], str]:
         """Remark on doubtful units that somebody stated; with the option for another, if any."""
         remarks, other = [], ""
-        for unit, (looks, _, _), _, worst in self._groups(asked=False):
+        for unit, (looks, why, _), _, worst in self._groups(asked=False):
             if looks != UNIT:
                 other = f"--units {shlex.quote(looks)}" if self._one_option else ""
                 said = f"if it was recorded in {looks}, say {other}" if other else "check its unit"
-                what = f"{worst.where} reaches {worst.largest:.4g} {unit}, and arms do not: {said}"
-                remarks.append(what)
+                in_other = f"{why} (in {looks} it is one)"
+                why = in_other if why == _HARDLY else "and arms do not"
+                remarks.append(f"{worst.where} reaches {worst.largest:.4g} {unit}, {why}: {said}")
         degrees = bool(self.angles) and {*map(self._answers.get, self.angles)} == {"deg"}
         shares = self.normalised and all(angle.largest <= 100 for angle in self.angles)
         if self.given and degrees and shares and not self.questions():

@@ -24,14 +24,14 @@ libfranka's and RTDE's logs have 1000 and 500."""
 _PLAUSIBLE: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "rad": {unit: (0.0, UNITS[unit].largest) for unit in ("rad", "deg")},
     "m": {unit: (0.0, UNITS[unit].largest) for unit in ("m", "cm", "mm")},
-    "percent": {"percent": (1.0, UNITS["percent"].largest), "share": (0.0, 1.0)},
+    "percent": {"share": (0.0, 1.1), "percent": (1.1, UNITS["percent"].largest)},
     "opening": {"m": (0.0, 0.3), "cm": (0.0, 30.0), "mm": (0.0, UNITS["mm"].largest)},
     "period": {u: (1 / (_FASTEST * scale), 1 / (_SLOWEST * scale)) for u, scale in SECONDS.items()},
 }
 """Units that angles, lengths and periods may be in, the likeliest first, with the least and the
 greatest number: of angles and lengths the largest one, of periods the time between two frames.
 Ours: no joint turns two turns; above 300, millimetres are likelier than an arm of three metres; no
-gripper opens by 30 cm; one that moves by less than a percent is recorded as a share."""
+gripper opens by 30 cm; one that stays within 1, or hardly beyond, is recorded as a share."""
 _BRACKETS = re.compile(r"(?P<name>.+?)(?: in)?\s*[\[(]\s*(?P<unit>[^\[\]()]+?)\s*[\])]")
 _ENDING = re.compile(r"(?P<name>.+?)(?:[_ ]in)?[_ ](?P<unit>[a-zµμ°]+)")
 _CAMEL = re.compile(r"(?P<name>.*[a-z0-9])(?P<unit>[A-Z][a-z]+|DEG|RAD|MM|CM|MS|US|NS)")
