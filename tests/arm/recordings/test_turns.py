@@ -149,3 +149,13 @@ def test_a_wrist_that_counts_a_turn_a_throw_is_brought_to_one_turn():
     spins = [(0.1 + 0.5 * T + 2 * np.pi * k)[:, None] for k in (0, 1, 1, 1, 1, 5)]
     read, said = brought_together(("joint1",), "rad", spins)
     assert np.ptp([motion[0, 0] for motion in read]) < 1e-9, said
+
+
+def test_joints_that_count_from_0_to_360_are_named_where_they_may_be_a_turn_too_high():
+    """A UR keeps within two turns, so that its limits do not tell."""
+    way = np.array([30.0, 60.0, -50.0, 10.0])
+    motions = [np.mod(np.array([20, 250, 90, 265.0]) + i + S[:, None] * way, 360) for i in range(3)]
+    names = ("pan", "lift", "elbow", "wrist")
+    _, said = brought_together(names, "deg", motions)
+    assert "lift 4.36 rad, wrist 4.63 rad may be a turn too high" in said
+    assert brought_together(names, "deg", [m - [40, 0, 0, 0] for m in motions])[1] == ""

@@ -52,6 +52,8 @@ _STILL = 0.03
 _NOISE = 0.02
 """The same of a channel that may be no angle: a magnet's current that is switched off steps by
 about a turn too. Ours: an encoder's noise."""
+_JOINTS = 4
+"""Joints none of which goes below 0 by chance. Ours."""
 _MOST_TURNS = 12
 """By which an episode is shifted at most. Ours."""
 _Form = Callable[[np.ndarray], np.ndarray]
@@ -163,10 +165,16 @@ def _align(
     for group in (*named, *flipping):
         said += together.take_forms(group, TURN[form.units[form.names.index(group[0])]])
     of_kind = zip(form.names, form.units, kinds(form.names), strict=True)
-    for i, (name, unit, kind) in enumerate(of_kind):
-        if unit in TURN and name not in attitudes and kind is not Kind.TOOL:
-            known = name in {*angles, *euler, *joints} or kind is Kind.ANGLE or not _is_word(name)
-            said += together.take_turns(i, _range(name, limits), known=known, fixed=fixed)
+    turning = {
+        i: name in {*angles, *euler, *joints} or kind is Kind.ANGLE or not _is_word(name)
+        for i, (name, unit, kind) in enumerate(of_kind)
+        if unit in TURN and name not in attitudes and kind is not Kind.TOOL
+    }
+    upwards = [i for i in turning if all(motion[:, i].min() >= 0 for motion in motions)]
+    for i, known in turning.items():
+        said += together.take_turns(i, _range(form.names[i], limits), known=known, fixed=fixed)
+    if len(upwards) == len(turning) >= _JOINTS:
+        said += together.doubt_turns(upwards)
     return form, said
 
 
@@ -366,6 +374,17 @@ class _Together:
             yield f"{listed(moved)}: {name} is taken {turns}, as the others have it: the same pose"
         for values, shift in zip(own, shifts, strict=True):
             values += shift * turn
+
+    def doubt_turns(self, channels: Sequence[int]) -> Iterator[str]:
+        """Name joints that all start beyond half a turn, where none was recorded below 0."""
+        starts = {i: min(motion[0, i] for motion in self.motions) for i in channels}
+        beyond = [i for i, start in starts.items() if start > TURN[self.form.units[i]] / 2]
+        if beyond:
+            each = [f"{self.form.names[i]} {starts[i]:.3g} {self.form.units[i]}" for i in beyond]
+            yield (
+                f"no joint is recorded below 0, as where angles count from 0 to 360 deg: "
+                f"{', '.join(each)} may be a turn too high for the arm's controller"
+            )
 
 
 def _range(name: str, limits: RobotLimits | None) -> tuple[float, float]:
