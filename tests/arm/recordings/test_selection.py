@@ -105,3 +105,13 @@ def test_columns_without_names_are_no_joint_whatever_the_plans_are_called():
     found = select([Recording("throw", T, q)], ["gripper", "joint2", "joint1"], joints, several)
     assert found.recorded_units == ("rad", "deg")
     np.testing.assert_array_equal(found.recordings[0].positions[:, 0], q[:, 2])
+
+
+def test_velocities_are_not_taken_for_positions():
+    t = np.arange(20) * 0.02
+    q, own = np.outer(t, [1.0, 2.0]), ("dq_0", "dq_1")
+    recordings, joints = [Recording("0", t, q, own)], ("joint1", "joint2")
+    with pytest.raises(InvalidDemonstrationsError, match=r"dq_0 to dq_1 .*positions are missing"):
+        select(recordings, joints, joints)
+    with pytest.raises(ConfigurationError, match="dq_0 to dq_1 look like velocities"):
+        select(recordings, own, joints, plan_units=("rad", "rad"))

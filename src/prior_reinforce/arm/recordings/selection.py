@@ -27,6 +27,7 @@ from prior_reinforce.arm.recordings.units import (
     say_names,
     split_unit,
 )
+from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.plans.whole_turns import TURN
 
@@ -166,15 +167,18 @@ def _are_all_columns(
 def _refuse_places(
     joints: Sequence[str], names: Sequence[str], plan_units: Sequence[str] | None
 ) -> None:
-    """ConfigurationError if recorded places are to be a plan's joints: `--joints x y z ...`."""
+    """ConfigurationError if places or velocities are to be a plan's joints: `--joints x y z`."""
     each = zip(joints, names, kinds(joints), plan_units or [""] * len(names), strict=True)
-    wrong = [(j, n) for j, n, kind, unit in each if kind is Kind.PLACE and unit in TURN]
-    if wrong:
-        places, called = zip(*wrong, strict=True)
-        raise ConfigurationError(
-            f"{say_names(places)} are a place, and not the joints {say_names(called)}; name "
-            "recorded joints with --joints, or what holds them with --key"
-        )
+    turning = [(j, n, kind) for j, n, kind, unit in each if unit in TURN]
+    places = [(j, n) for j, n, kind in turning if kind is Kind.PLACE]
+    rates = [(j, n) for j, n, _ in turning if j != n and says_no_position(j)]
+    for wrong, are in ((places, "are a place"), (rates, "look like velocities, torques or else")):
+        if wrong:
+            recorded, called = zip(*wrong, strict=True)
+            raise ConfigurationError(
+                f"{say_names(recorded)} {are}, and not the joints {say_names(called)}; name "
+                "recorded joints with --joints, or what holds them with --key"
+            )
 
 
 def _guess_names(
@@ -238,6 +242,10 @@ def _columns(
                 "no joints: name what holds the joints with --key, or import the place into a "
                 "workspace of --robot none"
             )
+        rates = [name for name in recording.names if says_no_position(name)]
+        if rates and len(recording.names) - len(rates) < len(joints):
+            there += f": {say_names(rates)} look like velocities, torques or else, and positions "
+            there += "are missing: record them, or"
         beside = list(recording.beside)
         for joint in missing_channels(joints, recording.names):
             for place in find_channels((joint,), beside) or ():
