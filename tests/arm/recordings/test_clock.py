@@ -256,3 +256,9 @@ def test_two_rates_that_contradict_each_other_are_refused():
         declared_rate("a.npz", stated)
     with pytest.raises(FileFormatError, match=r"rate says 20 .*, but meta\.fps 50"):
         declared_rate("a.npz", {"rate": np.array(20), "meta.fps": 50})
+
+
+@pytest.mark.parametrize(("count", "option"), [(280, "frame --rate HZ"), (2000, "ms")])
+def test_whole_numbers_called_t_count_frames_where_milliseconds_are_no_throw(count, option):
+    clock = clock_of("0", count, stamps=np.arange(count), name="t")
+    assert [one.option for one in clock.ambiguities] == [f"--time-unit {option}"]

@@ -55,6 +55,8 @@ SAME_RATE = 0.05
 """Rates that differ by a smaller share are one. Ours: clocks of recorders jitter and drift."""
 _APART = 3.0
 """Frames by which two clocks of one recording may differ. Ours: jitter is a frame or two."""
+_BRIEF = 0.5
+"""Seconds below which 0, 1, 2, ... count frames, and no milliseconds: a throw has rests. Ours."""
 _LOWEST_RATE, _HIGHEST_RATE = 1e-3, 1e6
 """Declared frames a second beyond which a file is damaged. Ours."""
 _RATE = re.compile(
@@ -216,7 +218,8 @@ def clock_of(
         )
     length = float(elapsed[-1]) if count else 0.0
     by = "its name says" if unit is None else "its format says"
-    chosen, ambiguities = _judge(name, period, length, known, by)
+    first = float(numbers[0]) if count else 0.0
+    chosen, ambiguities = _judge(name, period, length, first, known, by)
     if time_unit is not None and time_unit == known:
         chosen, ambiguities = known, ()  # said twice
     elif time_unit is not None:
@@ -224,7 +227,7 @@ def clock_of(
             raise ConfigurationError(
                 f"{name} is in {known}, but --time-unit says {time_unit}; drop it"
             )
-        chosen, ambiguities = _judge(name, period, length, time_unit, "--time-unit says")
+        chosen, ambiguities = _judge(name, period, length, first, time_unit, "--time-unit says")
     elif known is None and period > 0 and (at := rate or own_rate):
         # A rate that agrees in one unit settles it.
         agrees = [u for u, scale in SECONDS.items() if _same(at, 1 / (period * scale))]
@@ -342,12 +345,12 @@ def _doubt_rate(name: str, rate: float, count: int) -> tuple[Ambiguity, ...]:
 
 
 def _judge(
-    name: str, period: float, length: float, said: str | None, by: str
+    name: str, period: float, length: float, first: float, said: str | None, by: str
 ) -> tuple[str, tuple[Ambiguity, ...]]:
     """Infer the unit of a column of times, and say if it is ambiguous.
 
-    `period` (between two frames) and `length` are in that unit; `said` is what a person, the name
-    or the format gives, and `by` which of them: `its name says`.
+    `period` (between two frames), `length` and the `first` are in that unit; `said` is what a
+    person, the name or the format gives, and `by` which of them: `its name says`.
     """
 
     def rate_in(unit: str) -> str:
@@ -369,7 +372,8 @@ def _judge(
     what += f"in {looks} {rate_in(looks)}: it looks like {looks}"
     is_counter = COUNTER.search(name.lower()) is not None
     is_time = says_time(name) or name.lower() in SECONDS
-    if said is None and period == 1 and (is_counter or not is_time):
+    brief = first in (0, 1) and length * SECONDS[looks] < _BRIEF
+    if said is None and period == 1 and (is_counter or brief or not is_time):
         what = f"{name} counts frames, and nothing says how many a second are"
         what += f" (or it is a time: --time-unit {looks})" * (not is_counter)
         return "s", (Ambiguity(what, "--time-unit frame --rate HZ", guessed=False),)
