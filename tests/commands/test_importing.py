@@ -335,3 +335,19 @@ def test_a_picture_that_the_disk_refuses_is_a_remark(run, folder, tmp_path, monk
     assert "ulimit -f" in err
     assert not (tmp_path / "planar" / "demonstrations.png").exists()
     assert events_in(folder)[-1].kind == "demonstrations_imported"
+
+
+def test_inspecting_says_what_is_guessed_of_outcomes_and_an_import_what_was_said(
+    run, folder, tmp_path
+):
+    recordings(tmp_path / "some")
+    table = tmp_path / "some" / "outcomes.csv"
+    _, *rows = table.read_text().splitlines()
+    inches = [
+        [row.split(",")[0], *(str(39.37 * float(n)) for n in row.split(",")[1:3])] for row in rows
+    ]
+    table.write_text("\n".join(["episode,x,y", *map(",".join, inches)]))
+    out = run("import", folder, "some", "--inspect")[1]
+    assert "it looks like cm (or inches: --outcome-unit in) (--outcome-unit cm)" in out
+    out = run("import", folder, "some", "--outcome-unit", "cm")[1]
+    assert "outcomes.csv, in cm as --outcome-unit says (or inches: --outcome-unit in)" in out

@@ -174,6 +174,7 @@ class Import(OnWorkspace):
         places, episodes = recordings.outcome_places, selection.episodes
         table = self.outcomes or table_beside(places)
         known, unclear = self._known(wanted, recordings, selection, may_lack=True)
+        found = replace(found, selection=replace(found.selection, ambiguities=unclear))
         missing: list[str] = []
         if table is not None:
             missing = missing_outcomes(episodes, known)

@@ -25,6 +25,7 @@ _FAR, _FEW = 10.0, 3
 yet known how far they lie apart. Ours."""
 _AMONG = 1.25
 """Times farther or nearer than all others that one is still among them. Ours."""
+_INCHES = " (or inches: --outcome-unit in)"
 _NEAR_THE_BASE = 0.05
 """So near the base along a component, in [m], hardly any table of outcomes stays. Ours: a throw
 straight ahead scatters as much to the side; then the units are to be said in the head."""
@@ -91,11 +92,10 @@ def in_units(
         elif own is not None and given != unit and looks != unit:
             unclear.setdefault(unit, []).append(f"{name} reaches {most:.4g} {unit} ({rename})")
     _refuse_one_unit(outcomes, wanted, [*unclear])
-    inches = " (or inches: --outcome-unit in)"
     ambiguities = tuple(
         Ambiguity(
             f"in {where}, {' and '.join(reached)}, too far for an arm"
-            + (f": it looks like {unit}{inches * (unit == 'cm')}" if unit not in said else ""),
+            + (f": it looks like {unit}{_INCHES * (unit == 'cm')}" if unit not in said else ""),
             f"--outcome-unit {unit}",
         )
         for unit, reached in unclear.items()
@@ -103,7 +103,10 @@ def in_units(
     first = wanted[0] if wanted else ""
     sd_scale = conversion(outcomes.sd_unit, first, SD) if outcomes.sd_unit else [*scale, 1.0][0]
     values, sd = outcomes.values * np.array(scale), outcomes.sd * sd_scale
-    converted = replace(outcomes, values=values, sd=sd, units=tuple(wanted), sd_unit=first)
+    if given is not None and None in said:
+        where += f", in {given} as --outcome-unit says{_INCHES * (given == 'cm')}"
+    units = tuple(wanted)
+    converted = replace(outcomes, where=where, values=values, sd=sd, units=units, sd_unit=first)
     apart = float(np.nanmax(np.ptp(values, axis=0), initial=0.0)) if len(values) else 0.0
     most, as_wide = float(sd.max(initial=0.0)), ""
     if len(values) > _FEW and 0 < apart <= most:
