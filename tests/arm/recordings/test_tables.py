@@ -312,3 +312,25 @@ def test_utf_16_without_a_mark_is_called_so(tmp_path):
 def test_unused_room_may_end_in_a_newline(tmp_path):
     (tmp_path / "a.csv").write_bytes(b"t,q\n0,1\n1,2.5\n" + 40 * b"\0" + b"\n")
     assert len(read_table(tmp_path / "a.csv")) == 2
+
+
+def test_lines_above_the_names_are_to_be_taken_out(tmp_path):
+    path = tmp_path / "0.csv"
+    path.write_text("Recorder v2\n\nt,q1,q2\n0,1,2\n1,2,3\n")
+    with pytest.raises(FileFormatError, match="names are in line 3, take out all that is above"):
+        read_table(path)
+
+
+def test_units_in_cells_are_to_be_put_in_the_head_though_semicolons_are_there(tmp_path):
+    path = tmp_path / "outcomes.csv"
+    path.write_text("episode; x; y\n" + "".join(f"throw_{i}; 0.{i} m; 1 m\n" for i in range(5)))
+    with pytest.raises(FileFormatError, match=r"units in the head, x \[m\]"):
+        read_table(path)
+
+
+@pytest.mark.parametrize("form", ["{:02d}:{:02d}.{:02d}", "{:02d}:{:02d},{:02d}"])
+def test_minutes_and_seconds_are_times(tmp_path, form):
+    path = tmp_path / "0.csv"
+    cells = [form.format(i // 6000, i // 100 % 60, i % 100) for i in range(5990, 6010)]
+    path.write_text("\n".join(["t;q", *(f"{cell};0" for cell in cells)]))
+    np.testing.assert_allclose(read_table(path).stamps(0), np.arange(20) * 1e7)

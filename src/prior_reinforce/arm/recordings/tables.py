@@ -59,6 +59,8 @@ _OF_AN_OFFICE = re.compile(
     r"(?:(\d{1,2})[/.](\d{1,2})[/.](\d{4}),? +)?(\d{1,2}):(\d\d):(\d\d)([.,]\d+)? ?([AP]M)?", re.I
 )
 """`11/26/2026 1:05:09.3 PM`, `26.11.2026 13:05:09`: as office programs write them."""
+_MINUTES = re.compile(r"[0-5]\d:[0-5]\d[.,]\d+")
+"""`00:57.010`, minutes and seconds."""
 _SPAN = re.compile(r"([+-]?)(?:(\d+) days? \+?)?(\d+):([0-5]\d):([0-5]\d)(?:[.,](\d{1,9})\d*)?")
 _NAN = ("nan", "+nan", "-nan")
 _NONE = ("none", "null", "na", "n/a", "-", "inf", "-inf")
@@ -272,7 +274,7 @@ def _as_iso(text: str) -> str:
     The month comes first where there is AM or PM, or where the second number is no month.
     """
     if (found := _OF_AN_OFFICE.fullmatch(text)) is None:
-        return text
+        return f"0:{text}" if _MINUTES.fullmatch(text) else text
     first, second, year, hour, minute, seconds, fraction, half = found.groups()
     if half:
         hour = int(hour) % 12 + 12 * (half.lower() == "pm")
@@ -389,11 +391,17 @@ def _numbers_columns(where: str, first: list[str], body: list[list[str]], decima
 def _of_one_width(where: str, rows: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
     """Rows as wide as the first; FileFormatError names one that holds more cells."""
     width, names = max(len(row) for _, row in rows), len(rows[0][1])
+    words = [not any(re.match(r"[-+.]?\d", cell) for cell in row) for _, row in rows[:_SAMPLE]]
+    head = words.index(False) - 1 if False in words else 0
     for line, row in rows:
         if any(row[names:]):
             why = "where a comma is the decimal sign, put semicolons between cells"
             if all(len(row) == names + 1 for _, row in rows[1:]):
                 why += "; of R, write it with col.names = NA"
+            if any(cell.endswith(";") for cell in row):
+                why = "numbers alone in the cells, and units in the head, x [m]"
+            if head > 0 and len(rows[head][1]) == width:
+                why = f"if the names are in line {rows[head][0]}, take out all that is above them"
             raise FileFormatError(
                 f"{where}, line {line}: {len(row)} cells under {names} names; name every column, "
                 f"or mend that line ({why})"
