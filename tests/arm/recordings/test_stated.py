@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.arm.recordings.stated import frames_said, names_said, units_said
+from prior_reinforce.arm.recordings.options import ReadOptions
+from prior_reinforce.arm.recordings.stated import (
+    frames_said,
+    motion_keys,
+    names_said,
+    units_said,
+)
 from prior_reinforce.errors import FileFormatError
 from tests.arm.recordings.recorded import UR, Q
 
@@ -73,3 +79,13 @@ def test_a_number_of_frames_or_a_mask_says_what_is_padding(stated, kept):
 def test_frames_beyond_the_number_that_move_are_no_padding():
     with pytest.raises(FileFormatError, match="declares 40 samples by length but q holds 101"):
         frames_said("a", "q", {"q": Q, "length": np.int64(40)}, 101)
+
+
+@pytest.mark.parametrize(("name", "keys"), [("joint_angles", ("joint_angles",)), ("dq", None)])
+def test_the_only_array_that_may_be_the_motion_is_it(name, keys):
+    shapes = {name: (20, 6), "t": (20,)}
+    if keys is None:
+        with pytest.raises(FileFormatError, match="--key"):
+            motion_keys("a.npz", ReadOptions(), shapes, ("q",))
+    else:
+        assert motion_keys("a.npz", ReadOptions(), shapes, ("q",)) == keys

@@ -65,7 +65,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         if wrong:
             raise FileFormatError(
                 f"{source} has no feature {wrong[0] or _MEASURED}; features of numbers are "
-                f"{vectors}: say which with the key"
+                f"{vectors}: say which with --key"
             )
         key = keys[0]
         if not options.key:

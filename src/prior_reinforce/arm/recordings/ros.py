@@ -267,7 +267,7 @@ def _topic(bag: Path, reader: Any, key: str | None, *, beside: bool) -> tuple[li
             )
         raise FileFormatError(
             f"{bag}: {'no joint topic ' + key if key else f'{len(usable)} joint topics'}; topics "
-            f"of JointState or JointTrajectory are {_listed(usable)}: say which with the key"
+            f"of JointState or JointTrajectory are {_listed(usable)}: say which with --key"
         )
     return [c for c in reader.connections if c.topic == key], kinds[key]
 
@@ -305,7 +305,7 @@ def _states(
     if not kept:
         raise FileFormatError(
             f"{bag}: no message holds all of {list(wanted)}; joints in it are {say_names(every)}: "
-            "name those"
+            "name those, or if messages hold some each, publish all in one (joint_state_publisher)"
         )
     kept, remarks = _of_one_publisher(bag, [m for m in kept if len(m.content.position)], wanted)
     if len(kept) < len(messages):

@@ -60,17 +60,18 @@ def motion_keys(
     *,
     most: int = 2,
 ) -> tuple[str, ...]:
-    """Return which arrays of numbers are the motion: as given, the first usual one, or a joint's.
+    """Return which arrays are the motion: as given, the first usual one, a joint's, or the only.
 
     `shapes` are theirs, and `most` dimensions the motion may have, (T, D) or (N, T, D).
     FileFormatError lists those that may be it where one is missing or of another shape.
     """
     single = [name for name, shape in shapes.items() if len(shape) == 1]
+    there = sorted(name for name, shape in shapes.items() if 2 <= len(shape) <= most)
     keys = options.key or tuple(name for name in usual if name in shapes)[:1]
     keys = keys or tuple(single[i] for i in find_channels(options.joints or (), single) or ())
+    keys = keys or tuple(there if len(there) == 1 and not says_no_position(there[0]) else ())
     for key in keys or [" or ".join(usual)]:
         if not (1 if len(keys) > 1 else 2) <= len(shapes.get(key, ())) <= most:
-            there = sorted(name for name, shape in shapes.items() if 2 <= len(shape) <= most)
             raise FileFormatError(
                 f"{where} has no array {key} (expected numbers of shape (T, D)"
                 f"{' or (N, T, D)' * (most > 2)}); it holds {there}: say which with --key"

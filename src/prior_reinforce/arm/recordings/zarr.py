@@ -62,10 +62,8 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         how: Any = {"use_consolidated": False} if newer else {}
         group: Any = zarr.open_group(store, mode="r", **how)
         there = sorted(name.removeprefix("data/") for name in arrays if name.startswith("data/"))
-        vectors = [name for name in there if len(arrays[f"data/{name}"][0]) == 2]
         shapes = {name: arrays[f"data/{name}"][0] for name in there}
-        usual = vectors if len(vectors) == 1 else ()
-        keys = motion_keys(source, options, shapes, usual)
+        keys = motion_keys(source, options, shapes, ())
         if _ENDS not in arrays:
             raise FileFormatError(f"{source} has no numbers at {_ENDS}; copy the store again")
         ends = np.asarray(_numbers(source, group, arrays, _ENDS), dtype=np.int64).ravel()
