@@ -1,6 +1,7 @@
 """Outcomes beside a recording: matched, converted, and every one that is missing is named."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -11,10 +12,13 @@ from prior_reinforce.arm.recordings.outcomes import (
     check_rows,
     keep_places,
     missing_outcomes,
+    outcomes_of,
     places_of,
     read_outcomes,
     write_outcome_table,
 )
+from prior_reinforce.arm.recordings.recording import Recording
+from prior_reinforce.arm.recordings.takes import ways_back
 from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
@@ -464,3 +468,11 @@ def test_a_recording_whose_rows_are_counted_is_no_table_of_outcomes(tmp_path):
         rows = [f"{k / 10},{k},{np.sin(k / 4 + i)}" for k in range(20)]
         (tmp_path / f"throw_{i}.csv").write_text("\n".join(["t,take,joint1", *rows]))
     assert len(read_recordings(tmp_path)) == 2
+
+
+def test_what_has_no_outcome_is_left_out_by_name_and_no_throw_that_has_one():
+    t = np.arange(20) * 0.05
+    there, back = (Recording(str(i), t, np.linspace(i, 1 - i, 20)[:, None]) for i in (0, 1))
+    outcomes = Outcomes.of_numbers("a table", {"1": (0.8, 0.1)})
+    with pytest.raises(InvalidDemonstrationsError, match=r"--leave-out 0$"):
+        outcomes_of(["0", "1"], outcomes, partial(ways_back, [there, back]))

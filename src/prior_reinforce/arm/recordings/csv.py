@@ -62,7 +62,6 @@ _ABSENT = 9e9
 """What ABB writes for the position of an axis that is not there."""
 _MOST_WORDS = 8
 """Texts between which a column switches. Ours."""
-
 _ECHOED = ("name", "position", "velocity", "effort")
 """Arrays of a sensor_msgs/JointState, in order."""
 _SECOND = 10**9

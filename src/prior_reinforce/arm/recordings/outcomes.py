@@ -12,7 +12,8 @@ import csv
 import io
 import math
 import re
-from collections.abc import Mapping, Sequence
+import shlex
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -394,12 +395,14 @@ def in_order(source: Path, motions: Sequence[str], outcomes: Outcomes, advice: s
 
 
 def outcomes_of(
-    episodes: Sequence[str], outcomes: Outcomes, advice: str = ""
+    episodes: Sequence[str],
+    outcomes: Outcomes,
+    advice: Callable[[Sequence[str]], str] = lambda missing: "",
 ) -> tuple[Points, Points]:
     """Return each episode's outcome in order, and its standard deviation, each (N, k).
 
     Episodes are matched by name, else by the number behind the outcomes' `word` or at the end of
-    their names (`3` is `demo_003`). `advice` is for who lacks some.
+    their names (`3` is `demo_003`). `advice` is for who lacks some, of those.
 
     Raises:
         InvalidDemonstrationsError: Outcomes that are missing or not finite; each is named.
@@ -407,10 +410,11 @@ def outcomes_of(
     there = outcomes.episodes
     picked, missing = _matched(episodes, outcomes), missing_outcomes(episodes, outcomes)
     if missing:
+        back = advice(missing)
         raise InvalidDemonstrationsError(
             f"no outcome for episodes {listed(missing)} in {outcomes.where} (it has "
             f"{listed(there) or 'none'}); {_renumber(episodes, outcomes)}measure and add them, or "
-            f"leave those episodes out{'; ' * bool(advice)}{advice}"
+            f"leave those episodes out, --leave-out {shlex.join(missing)}{'; ' * bool(back)}{back}"
         )
     rows = [there.index(picked[episode]) for episode in episodes]
     values = outcomes.values[rows]

@@ -7,7 +7,7 @@ can be left out.
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, pairwise
 
@@ -239,11 +239,12 @@ def odd_starts(
             )
 
 
-def ways_back(recordings: Sequence[Recording]) -> str:
-    """Say what to do with motions that go back to where the one before began; empty if none do."""
+def ways_back(recordings: Sequence[Recording], among: Collection[str] | None = None) -> str:
+    """Say what to do with motions, `among` some, that go back to where the one before began."""
     back = list[str]()
     for before, motion in pairwise(recordings):
         alike = before.positions.shape[1] == motion.positions.shape[1]
+        alike = alike and (among is None or motion.episode in among)
         if alike and before.episode not in back and _goes_back(before, motion):
             back.append(motion.episode)
     if not back:
