@@ -18,12 +18,7 @@ from prior_reinforce.arm.recordings.channels import measured_of
 from prior_reinforce.arm.recordings.naming import vectors
 from prior_reinforce.arm.recordings.recording import Beside, Positions, Recording
 from prior_reinforce.arm.recordings.time_finder import Times, is_clock, says_time, tells_time
-from prior_reinforce.arm.recordings.units import (
-    CHANNEL_UNITS,
-    Ambiguity,
-    say_names,
-    split_unit,
-)
+from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, Ambiguity, say_names, split_unit
 from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.plans.signals import held_channels
 from prior_reinforce.plans.whole_turns import TURN

@@ -216,10 +216,8 @@ def clock_of(
             f"episode {episode}: {name} steps by {period:g} a frame, which is no time in any unit; "
             "mend it, or leave the times unread with --time-column none"
         )
-    length = float(elapsed[-1]) if count else 0.0
     by = "its name says" if unit is None else "its format says"
-    first = float(numbers[0]) if count else 0.0
-    chosen, ambiguities = _judge(name, period, length, first, known, by)
+    chosen, ambiguities = _judge(name, period, numbers, known, by)
     if time_unit is not None and time_unit == known:
         chosen, ambiguities = known, ()  # said twice
     elif time_unit is not None:
@@ -227,7 +225,7 @@ def clock_of(
             raise ConfigurationError(
                 f"{name} is in {known}, but --time-unit says {time_unit}; drop it"
             )
-        chosen, ambiguities = _judge(name, period, length, first, time_unit, "--time-unit says")
+        chosen, ambiguities = _judge(name, period, numbers, time_unit, "--time-unit says")
     elif known is None and period > 0 and (at := rate or own_rate):
         # A rate that agrees in one unit settles it.
         agrees = [u for u, scale in SECONDS.items() if _same(at, 1 / (period * scale))]
@@ -345,13 +343,14 @@ def _doubt_rate(name: str, rate: float, count: int) -> tuple[Ambiguity, ...]:
 
 
 def _judge(
-    name: str, period: float, length: float, first: float, said: str | None, by: str
+    name: str, period: float, numbers: Times, said: str | None, by: str
 ) -> tuple[str, tuple[Ambiguity, ...]]:
     """Infer the unit of a column of times, and say if it is ambiguous.
 
-    `period` (between two frames), `length` and the `first` are in that unit; `said` is what a
-    person, the name or the format gives, and `by` which of them: `its name says`.
+    `period` (between two frames) and the `numbers` are in that unit; `said` is what a person, the
+    name or the format gives, and `by` which of them: `its name says`.
     """
+    length = float(numbers[-1] - numbers[0]) if len(numbers) else 0.0
 
     def rate_in(unit: str) -> str:
         scale = SECONDS[unit]
@@ -372,7 +371,7 @@ def _judge(
     what += f"in {looks} {rate_in(looks)}: it looks like {looks}"
     is_counter = COUNTER.search(name.lower()) is not None
     is_time = says_time(name) or name.lower() in SECONDS
-    brief = first in (0, 1) and length * SECONDS[looks] < _BRIEF
+    brief = numbers[0] in (0, 1) and length * SECONDS[looks] < _BRIEF
     if said is None and period == 1 and (is_counter or brief or not is_time):
         what = f"{name} counts frames, and nothing says how many a second are"
         what += f" (or it is a time: --time-unit {looks})" * (not is_counter)

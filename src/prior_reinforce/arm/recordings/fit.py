@@ -128,9 +128,7 @@ def _sides(directions: Float[np.ndarray, "N D"]) -> Iterator[Float[np.ndarray, "
 
 
 def _candidates(
-    demonstrations: Demonstrations,
-    episodes: tuple[str, ...],
-    directions: Float[np.ndarray, "N D"],
+    demonstrations: Demonstrations, episodes: tuple[str, ...], directions: Float[np.ndarray, "N D"]
 ) -> Iterator[tuple[tuple[int, ...], str, Points, float]]:
     """Rows, what slip it is, the outcomes without it, and how much better they must be.
 

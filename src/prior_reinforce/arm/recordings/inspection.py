@@ -26,11 +26,7 @@ from prior_reinforce.arm.robots.gate import check_plan
 from prior_reinforce.arm.robots.gate_settings import GateSettings
 from prior_reinforce.arm.robots.limits import RobotLimits, joint_of, match_joints
 from prior_reinforce.arm.robots.report import LimitLine, LimitReport
-from prior_reinforce.errors import (
-    ConfigurationError,
-    InvalidDemonstrationsError,
-    InvalidPlanError,
-)
+from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError, InvalidPlanError
 from prior_reinforce.plans.interpolation import RATE
 from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.plans.plan_format import PlanFormat

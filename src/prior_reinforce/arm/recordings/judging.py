@@ -181,10 +181,7 @@ class Judge:
         return Doubt("percent" if one.largest <= 100 else UNIT, f"and {why} it is no angle")
 
     def _hardly_moves(self, one: Belief) -> Doubt | None:
-        """Joints that are all said to be in degrees, and stay within 6.28 of them, are not.
-
-        Where a file says so, it is remarked on, at half of that; a place may turn by as little.
-        """
+        """Joints that are all said to be in degrees, and stay within a few of them, are not."""
         said = self.given == "one for all" and self.silent
         most = TURN["rad"] if said else TURN["rad"] / 2 * (not self.places)
         small = all(angle.stated == "deg" and angle.largest < most for angle in self.angles)
@@ -281,8 +278,7 @@ class Judge:
             if looks != UNIT:
                 other = f"--units {shlex.quote(looks)}" if self._one_option else ""
                 said = f"if it was recorded in {looks}, say {other}" if other else "check its unit"
-                in_other = f"{why} (in {looks} it is one)"
-                why = in_other if why == _HARDLY else "and arms do not"
+                why = f"{why} (in {looks} it is one)" if why == _HARDLY else "and arms do not"
                 remarks.append(f"{worst.where} reaches {worst.largest:.4g} {unit}, {why}: {said}")
         degrees = bool(self.angles) and {*map(self._answers.get, self.angles)} == {"deg"}
         shares = self.normalised and all(angle.largest <= 100 for angle in self.angles)

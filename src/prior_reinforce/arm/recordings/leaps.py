@@ -7,6 +7,7 @@ leapt: its numbers have, and a plan with them would sweep the whole way back in 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import product
 
 import numpy as np
 from jaxtyping import Float
@@ -116,10 +117,8 @@ def _moves_on(times: Times, values: Values, frame: int, sigma: float) -> bool:
     after = list(_slopes(times[ends:], values[ends:], sigma))
     little = abs(values[ends] - values[frame]) / (_TIMES * (times[ends] - times[frame]))
     return any(
-        0 < one / other < _ALIKE and 0 < other / one < _ALIKE
-        for one in before
-        for other in after
-        if max(abs(one), abs(other)) < little
+        1 / _ALIKE < one / other < _ALIKE and max(abs(one), abs(other)) < little
+        for one, other in product(before, after)
     )
 
 

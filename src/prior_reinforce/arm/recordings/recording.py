@@ -17,12 +17,7 @@ from jaxtyping import Float
 from prior_reinforce.arm.recordings.bounds import check_names
 from prior_reinforce.arm.recordings.clock import Clock
 from prior_reinforce.arm.recordings.time_finder import Times
-from prior_reinforce.arm.recordings.units import (
-    CHANNEL_UNITS,
-    Ambiguity,
-    say_names,
-    split_unit,
-)
+from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, Ambiguity, say_names, split_unit
 from prior_reinforce.arrays import Point
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError, PriorReinforceError
 from prior_reinforce.files import without_advice

@@ -189,10 +189,8 @@ def _guess_names(
         return joints, ()
     own = recording.columns != recording.names  # numbered columns of a log whose order is known
     if not (recording.named or own) and len(recording.names) == len(joints) > 1:
-        what = (
-            f"{recording.episode} names no columns, and nothing in it says their order, which has"
-        )
-        what += f" to be known from its recorder: are they {say_names(joints)}, in that order"
+        what = f"{recording.episode} names no columns, and nothing in it says their order, which "
+        what += f"has to be known from its recorder: are they {say_names(joints)}, in that order"
         return joints, (Ambiguity(what, f"--joints {shlex.join(joints)}"),)
     if not recording.named or find_channels(joints, recording.names) is not None:
         return joints, ()

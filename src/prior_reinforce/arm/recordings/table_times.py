@@ -47,7 +47,6 @@ _SAYS = re.compile(
 )
 """`fps: 40`, `sample rate = 1 kHz`."""
 _SECONDS = re.compile(r"(?P<stem>.*?)(secs?|seconds|s)")
-
 _THOUSAND = re.compile(r"\d{1,3}([.,]\d{3})+")
 """`1.000` beside a decimal comma."""
 

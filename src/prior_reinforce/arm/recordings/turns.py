@@ -170,11 +170,15 @@ def _align(
         for i, (name, unit, kind) in enumerate(of_kind)
         if unit in TURN and name not in attitudes and kind is not Kind.TOOL
     }
-    upwards = [i for i in turning if all(motion[:, i].min() >= 0 for motion in motions)]
+    upwards = all(motion[:, [*turning]].min() >= 0 for motion in motions if turning)
     for i, known in turning.items():
         said += together.take_turns(i, _range(form.names[i], limits), known=known, fixed=fixed)
-    if len(upwards) == len(turning) >= _JOINTS:
-        said += together.doubt_turns(upwards)
+    starts = {i: min(motion[0, i] for motion in motions) for i in turning}
+    high = [i for i, start in starts.items() if start > TURN[form.units[i]] / 2]
+    if upwards and high and len(turning) >= _JOINTS:
+        each = ", ".join(f"{form.names[i]} {starts[i]:.3g} {form.units[i]}" for i in high)
+        what = f"{each} may be a turn too high for the arm's controller"
+        said.append(f"no joint goes below 0, as where angles count from 0 to 360 deg: {what}")
     return form, said
 
 
@@ -374,17 +378,6 @@ class _Together:
             yield f"{listed(moved)}: {name} is taken {turns}, as the others have it: the same pose"
         for values, shift in zip(own, shifts, strict=True):
             values += shift * turn
-
-    def doubt_turns(self, channels: Sequence[int]) -> Iterator[str]:
-        """Name joints that all start beyond half a turn, where none was recorded below 0."""
-        starts = {i: min(motion[0, i] for motion in self.motions) for i in channels}
-        beyond = [i for i, start in starts.items() if start > TURN[self.form.units[i]] / 2]
-        if beyond:
-            each = [f"{self.form.names[i]} {starts[i]:.3g} {self.form.units[i]}" for i in beyond]
-            yield (
-                f"no joint is recorded below 0, as where angles count from 0 to 360 deg: "
-                f"{', '.join(each)} may be a turn too high for the arm's controller"
-            )
 
 
 def _range(name: str, limits: RobotLimits | None) -> tuple[float, float]:
