@@ -73,7 +73,7 @@ def test_pickled_objects_are_never_loaded(tmp_path):
     ("arrays", "says"),
     [
         ({"q": np.zeros((5, 2))}, "give the rate"),
-        ({"angles": np.zeros((5, 2)), "dt": 0.01}, r"no array q .* it holds \['angles'\]"),
+        ({"a": np.zeros((5, 2)), "b": np.zeros((5, 2))}, r"no array q .* it holds \['a', 'b'\]"),
         ({"q": np.zeros(5), "dt": 0.01}, r"expected numbers of shape \(T, D\)"),
         ({"q": np.zeros((5, 2)), "t": np.zeros(4)}, "has 5 frames, but t of shape"),
         ({"q": np.zeros((5, 2)), "t": np.zeros(5)}, "time does not increase at frame 1"),

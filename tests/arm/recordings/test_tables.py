@@ -316,7 +316,7 @@ def test_unused_room_may_end_in_a_newline(tmp_path):
 
 def test_lines_above_the_names_are_to_be_taken_out(tmp_path):
     path = tmp_path / "0.csv"
-    path.write_text("Recorder v2\n\nt,q1,q2\n0,1,2\n1,2,3\n")
+    path.write_text("Recorder v2\n,1\nt,q1,q2\n0,1,2\n1,2,3\n")
     with pytest.raises(FileFormatError, match="names are in line 3, take out all that is above"):
         read_table(path)
 

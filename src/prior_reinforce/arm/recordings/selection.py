@@ -243,7 +243,7 @@ def _columns(
         rates = [name for name in recording.names if says_no_position(name)]
         if rates and len(recording.names) - len(rates) < len(joints):
             there += f": {say_names(rates)} look like velocities, torques or else, and positions "
-            there += "are missing: record them, or"
+            there += "are missing; record them, or if another column holds them"
         beside = list(recording.beside)
         for joint in missing_channels(joints, recording.names):
             for place in find_channels((joint,), beside) or ():
