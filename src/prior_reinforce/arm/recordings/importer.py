@@ -75,10 +75,6 @@ FORMATS: Mapping[str, Format] = {
 }
 """What can be read. `hdf5` covers robomimic, ManiSkill and ALOHA; `ros` ROS 1 bags, ROS 2 sqlite
 bags and MCAP; `zarr` is the replay buffer of Diffusion Policy."""
-_HOW_TO_SAVE = (
-    "save each episode as CSV (a line of names, a row a frame, the time in a column) or NPZ; "
-    f"what is read is {', '.join(FORMATS)} (--format, where a name does not tell)"
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -413,7 +409,7 @@ def read(source: str | os.PathLike[str], options: ReadOptions | None = None) -> 
             f"{source} holds more than one episode named {', '.join(twice)}; rename their files"
         )
     if not there:
-        raise FileFormatError(f"{source} holds no episode of format {kind}; {_HOW_TO_SAVE}")
+        raise FileFormatError(f"{source} holds no episode of format {kind}; {_how_to_save()}")
     wanted = there if options.episodes is None else options.episodes
     missing = [e for e in (*wanted, *(options.leave_out or ())) if e not in there]
     if missing or not read_ones:
@@ -422,6 +418,13 @@ def read(source: str | os.PathLike[str], options: ReadOptions | None = None) -> 
         raise InvalidDemonstrationsError(f"{what} in {source}; it has {names}: name those")
     chosen = tuple(read_ones[name] for name in wanted if name in read_ones)
     return Recordings(source, kind, options, chosen, tuple(there))
+
+
+def _how_to_save() -> str:
+    return (
+        "save each episode as CSV (a line of names, a row a frame, the time in a column) or NPZ; "
+        f"what is read is {', '.join(FORMATS)} (--format, where a name does not tell)"
+    )
 
 
 def detect_format(source: Path) -> str:
@@ -441,7 +444,7 @@ def detect_format(source: Path) -> str:
                     f"{' or '.join(within)}{join}"
                 )
         if not found:
-            raise FileFormatError(f"{source} holds nothing that can be read; {_HOW_TO_SAVE}")
+            raise FileFormatError(f"{source} holds nothing that can be read; {_how_to_save()}")
         raise FileFormatError(
             f"{source} looks like {' and '.join(found)}: say which with --format, or name one file"
         )
