@@ -345,9 +345,8 @@ class Recordings:
             InvalidDemonstrationsError: As in `outcomes_of` and `inspect`, or a motion that comes
                 twice.
         """
-        # First, since what comes then takes its time.
-        advice = partial(ways_back, selection.recordings)
-        seen, sd = outcomes_of(selection.episodes, outcomes, advice)
+        back = partial(ways_back, selection.recordings)
+        seen, sd = outcomes_of(selection.episodes, outcomes, back)  # first, as the rest is slow
         inspection = inspect(selection, wanted)
         if inspection.copies:
             raise InvalidDemonstrationsError(inspection.copies)
