@@ -35,8 +35,9 @@ def until_read(ask: Callable[[], str], read: Callable[[str], T]) -> T:
         EOFError: `ask` gets no answer.
     """
     while True:
+        said = ask()
         try:
-            return read(ask())
+            return read(said)
         except (ConfigurationError, InvalidFeedbackError) as error:
             print(plain(str(error)), flush=True)
 

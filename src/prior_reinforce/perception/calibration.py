@@ -14,6 +14,7 @@ import os
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 import numpy as np
@@ -31,8 +32,6 @@ _Row = tuple[float, float, float]
 
 class _Saved(
     msgspec.Struct,
-    tag_field="kind",
-    tag="prior-reinforce table calibration 2",
     rename={
         "picture": "picture_px",
         "height": "height_m",
@@ -45,6 +44,7 @@ class _Saved(
 ):
     """What a file holds of a `TableCalibration`; its numbers are finite, as JSON's are."""
 
+    kind: Literal["prior-reinforce table calibration 2"]
     homography: tuple[_Row, _Row, _Row]
     height: float
     fit_error: float
@@ -287,7 +287,8 @@ class TableCalibration:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the calibration as JSON."""
-        saved = _Saved(**vars(self) | {"homography": self.homography.tolist()})
+        own = vars(self) | {"homography": self.homography.tolist()}
+        saved = _Saved("prior-reinforce table calibration 2", **own)
         files.write(
             Path(path), json.dumps(msgspec.to_builtins(saved, enc_hook=float), indent=2) + "\n"
         )
@@ -306,7 +307,9 @@ class TableCalibration:
             raise FileFormatError(
                 f"{path} is not a table calibration ({error}); write one with TableCalibration.save"
             ) from error
-        return cls(**msgspec.structs.asdict(saved) | {"homography": np.array(saved.homography)})
+        own = msgspec.structs.asdict(saved) | {"homography": np.array(saved.homography)}
+        del own["kind"]
+        return cls(**own)
 
 
 def _direct_linear_transform(points: _Pairs, pixels: _Pairs) -> Float[np.ndarray, "3 3"]:
