@@ -83,9 +83,30 @@ def test_frames_beyond_the_number_that_move_are_no_padding():
 
 @pytest.mark.parametrize(("name", "keys"), [("joint_angles", ("joint_angles",)), ("dq", None)])
 def test_the_only_array_that_may_be_the_motion_is_it(name, keys):
-    shapes = {name: (20, 6), "t": (20,)}
+    shapes = {name: np.zeros((20, 6)), "t": np.zeros(20)}
     if keys is None:
         with pytest.raises(FileFormatError, match="--key"):
             motion_keys("a.npz", ReadOptions(), shapes, ("q",))
     else:
         assert motion_keys("a.npz", ReadOptions(), shapes, ("q",)) == keys
+
+
+@pytest.mark.parametrize("q", [np.zeros(20), np.zeros((20, 6), dtype=bool), np.array(["a"])])
+def test_an_array_that_holds_no_motion_is_named_with_its_shape_and_type(q):
+    with pytest.raises(FileFormatError) as refused:
+        motion_keys("a.npz", ReadOptions(), {"q": q}, ("q",))
+    assert f"q of shape {q.shape} and type {q.dtype}" in str(refused.value)
+    with pytest.raises(FileFormatError, match="no array q"):
+        motion_keys("a.npz", ReadOptions(), {}, ("q",))
+
+
+def test_one_joint_is_a_motion_if_it_is_asked_for_by_name():
+    arrays = {"a": np.zeros(20), "b": np.zeros(20)}
+    assert motion_keys("a.h5", ReadOptions(key=("b",)), arrays, ("q",)) == ("b",)
+    assert motion_keys("a.h5", ReadOptions(joints=("a",)), arrays, ("q",)) == ("a",)
+
+
+def test_truth_values_are_no_motion():
+    arrays = {"q": np.zeros((20, 6)), "gripper": np.zeros(20, dtype=bool)}
+    with pytest.raises(FileFormatError, match=r"gripper of shape .* bool"):
+        motion_keys("a.npz", ReadOptions(key=("q", "gripper")), arrays, ("q",))

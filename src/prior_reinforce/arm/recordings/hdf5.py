@@ -66,8 +66,9 @@ def _demo(path: Path, top: Any, within: str, options: ReadOptions, episode: str)
     with named_damage(path, "HDF5"):
         group = _own(path, top, within)
         found = _arrays_in(path, group, options.key or _KEYS)
-        shapes = {name: own.shape for name, own in found.items()}
-        keys = motion_keys(f"{path}: {group.name}", options, shapes, _KEYS)
+        keys = motion_keys(f"{path}: {group.name}", options, found, _KEYS)
+        numbers = {name: own for name, own in found.items() if own.dtype.kind in "biuf"}
+        shapes = {name: own.shape for name, own in numbers.items() if own.shape}
         key, count = keys[0], shapes[keys[0]][0]
         # Whatever may move, at any rate, or tells the time of the frames, or marks what is padding.
         there = {
@@ -140,11 +141,11 @@ def _is_own(found: Any) -> bool:
 
 
 def _arrays_in(path: Path, group: Any, keys: Sequence[str]) -> dict[str, Any]:
-    """The arrays of numbers in an episode by their path in it, and those that keys link to."""
+    """The arrays in an episode by their path in it, and those that keys link to."""
     items: dict[str, Any] = {}
     group.visititems(lambda name, item: items.update({name: item}))
     items |= {key: _own(path, group, key) for key in keys}
-    return {n: a for n, a in items.items() if _is_own(a) and a.shape and a.dtype.kind in "biuf"}
+    return {n: a for n, a in items.items() if _is_own(a) and a.shape is not None}
 
 
 def _numbers(path: Path, name: str, found: Any) -> Stamps:

@@ -75,8 +75,7 @@ def _each(path: Path, arrays: Arrays, options: ReadOptions) -> Episodes:
 
 
 def _episodes(path: Path, arrays: Arrays, name: str, options: ReadOptions) -> Episodes:
-    shapes = {name: own.shape for name, own in arrays.items() if own.dtype.kind in "biuf"}
-    keys = motion_keys(path, options, shapes, _MOTION_KEYS, most=3)
+    keys = motion_keys(path, options, arrays, _MOTION_KEYS, most=3)
     motions = arrays[keys[0]]
     outcomes = next((arrays[name] for name in _OUTCOME_KEYS if name in arrays), None)
     episodes, several = [name], motions.ndim == 3
@@ -93,7 +92,7 @@ def _episodes(path: Path, arrays: Arrays, name: str, options: ReadOptions) -> Ep
         )
     texts, numbers = said_in({n: array for n, array in arrays.items() if array.dtype.kind in "SU"})
     names = next((texts[name] for name in ("joint_names", "names") if name in texts), ())
-    wrong = len(keys) == 1 and len(set(names)) != motions.shape[2]
+    wrong = len(keys) == 1 and len(set(names)) != (*motions.shape, 1)[2]
 
     def episode_of(index: int) -> Recording:
         outcome = None if outcomes is None else outcomes[index]

@@ -55,25 +55,31 @@ _MOST_SAID = 1_000_000
 def motion_keys(
     where: object,
     options: ReadOptions,
-    shapes: Mapping[str, tuple[int, ...]],
+    arrays: Mapping[str, Any],
     usual: Sequence[str],
     *,
     most: int = 2,
 ) -> tuple[str, ...]:
     """Return which arrays are the motion: as given, the first usual one, a joint's, or the only.
 
-    `shapes` are theirs, and `most` dimensions the motion may have, (T, D) or (N, T, D).
-    FileFormatError lists those that may be it where one is missing or of another shape.
+    `arrays` have a shape and a dtype, and `most` dimensions the motion may have, (T, D) or
+    (N, T, D); what is asked for by name may be of one joint, (T,). FileFormatError lists those that
+    may be it where one is missing, or holds no numbers of such a shape.
     """
+    shapes = {name: own.shape for name, own in arrays.items() if own.dtype.kind in "fiu"}
     single = [name for name, shape in shapes.items() if len(shape) == 1]
     there = sorted(name for name, shape in shapes.items() if 2 <= len(shape) <= most)
     keys = options.key or tuple(name for name in usual if name in shapes)[:1]
     keys = keys or tuple(single[i] for i in find_channels(options.joints or (), single) or ())
     keys = keys or tuple(there if len(there) == 1 and not says_no_position(there[0]) else ())
-    for key in keys or [" or ".join(usual)]:
-        if not (1 if len(keys) > 1 else 2) <= len(shapes.get(key, ())) <= most:
+    for key in keys or [name for name in usual if name in arrays] or [" or ".join(usual)]:
+        least = 1 if options.key or (key in single and key not in usual) else 2
+        if not least <= len(shapes.get(key, ())) <= most:
+            has = f"no array {key}"
+            if key in arrays:
+                has = f"{key} of shape {arrays[key].shape} and type {arrays[key].dtype}"
             raise FileFormatError(
-                f"{where} has no array {key} (expected numbers of shape (T, D)"
+                f"{where} has {has} (expected numbers of shape (T, D)"
                 f"{' or (N, T, D)' * (most > 2)}); it holds {there}: say which with --key"
             )
     return keys
@@ -104,7 +110,10 @@ def recorded_among(
     flat = {n: a.ravel() for n, a in arrays.items() if a.size == count and n not in keys}
     arrays = {**arrays, **flat}
     kept, why = frames_said(f"{where}: {episode}", keys[0], {**stated, **arrays}, count)
-    arrays = {n: a[:kept] if a.shape[:1] == (count,) else a for n, a in arrays.items()}
+    arrays, stated = (
+        {n: a[:kept] if np.shape(a)[:1] == (count,) else a for n, a in each.items()}
+        for each in (arrays, stated)
+    )
     positions, known = joined(where, keys, arrays, texts, options.joints)
     bare, units = without_units(names or known)
     if not bare and len(positions) > 1:

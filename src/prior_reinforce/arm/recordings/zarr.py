@@ -63,7 +63,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         group: Any = zarr.open_group(store, mode="r", **how)
         there = sorted(name.removeprefix("data/") for name in arrays if name.startswith("data/"))
         shapes = {name: arrays[f"data/{name}"][0] for name in there}
-        keys = motion_keys(source, options, shapes, ())
+        keys = motion_keys(source, options, {name: group[f"data/{name}"] for name in there}, ())
         if _ENDS not in arrays:
             raise FileFormatError(f"{source} has no numbers at {_ENDS}; copy the store again")
         ends = np.asarray(_numbers(source, group, arrays, _ENDS), dtype=np.int64).ravel()
