@@ -61,6 +61,14 @@ def test_only_the_units_that_may_stand_there_are_taken():
     assert known_unit("counts") is None
 
 
+@pytest.mark.parametrize("unit", ["milli m", "cm ahead", "N m", "0.01 deg", "bar", "%"])
+def test_whatever_holds_a_letter_in_square_brackets_is_a_unit_and_a_number_is_none(unit):
+    found = split_unit(f"x [{unit}]", any_word=True)
+    assert found[0] == "x"
+    assert found[1] is not None
+    assert split_unit("x[0]", any_word=True) == ("x[0]", None)
+
+
 def test_conversions():
     assert conversion("deg", "rad", "q") == pytest.approx(math.pi / 180)
     assert conversion("rad", "deg", "q") == pytest.approx(180 / math.pi)

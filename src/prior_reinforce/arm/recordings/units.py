@@ -43,8 +43,9 @@ _NO_ENDING = {
 """Words that are no unit there: in `plug_in`, `q_min`, `firstDay`."""
 _BEFORE_NUMBER = re.compile(r"(?P<name>.+?)_(?P<unit>deg|rad|mm|cm)(?P<number>_?\d+)", re.I)
 """`q_deg_0`."""
-_UNKNOWN = re.compile(r"(?P<name>.+?)\s*\[\s*(?P<unit>(?:[\d.]+ ?)?[^\W\d_][^\[\]\s]*|%)\s*\]")
-"""`pressure [bar]`, in a unit that this program does not know, or `q1 [0.01 deg]`."""
+_UNKNOWN = re.compile(r"(?P<name>.+?)\s*\[\s*(?P<unit>[^\[\]]*[^\W\d_][^\[\]]*?|%)\s*\]")
+"""`pressure [bar]` or `x [cm ahead]`, in a unit that this program does not know: whatever holds a
+letter; `x[0]` is a name."""
 
 
 @dataclass(frozen=True)
@@ -86,8 +87,8 @@ def split_unit(
     """Split a column's name `x_cm`, `q0 [deg]` or `time (ms)` into the name and the unit in it.
 
     `among` are units that may stand there, in brackets also behind a number, `(0.001deg)`; with
-    `any_word` so is any word in square brackets: `volume [ml]`. Without such a unit, the whole name
-    and None.
+    `any_word` so is whatever holds a letter in square brackets: `volume [ml]`. Without such a unit,
+    the whole name and None.
     """
     for pattern in (_BRACKETS, _ENDING, _BEFORE_NUMBER, _CAMEL):
         match = pattern.fullmatch(column.strip())
