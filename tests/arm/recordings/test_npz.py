@@ -5,8 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
+from prior_reinforce.arm.recordings import import_demonstrations, npz, read_recordings
 from prior_reinforce.arm.recordings.beside import moving_beside
+from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.selection import select
 from prior_reinforce.arm.robots.plan_files import write_plan
 from prior_reinforce.errors import (
@@ -304,3 +305,41 @@ def test_arrays_beside_a_motion_are_no_throws_and_outcomes_go_with_their_throw(t
     np.savez(tmp_path / "throws.npz", **own, dt=0.01, q=own["throw_1"])
     (read,) = read_recordings(tmp_path / "throws.npz")
     assert read.episode == "throws"
+
+
+UNEVEN = np.append(np.arange(100) / 100, 1.6)
+Q = np.sin(np.arange(101) / 20)[:, None] * [1.0, 0.5]
+
+
+def read_one(folder, rate=None, time_column=None, key=None, **arrays):
+    np.savez(folder / "a.npz", **arrays)
+    options = ReadOptions(rate=rate, time_column=time_column, key=key)
+    ((_, read_it),) = npz.read(folder / "a.npz", options)
+    return read_it()
+
+
+@pytest.mark.parametrize("rate", [None, 100.0])
+def test_a_time_that_rises_unevenly_is_asked_about_beside_a_rate(tmp_path, rate):
+    found = read_one(tmp_path, rate, q=Q, fps=100.0, time_in_contact=UNEVEN)
+    assert "--time-column time_in_contact" in [one.option for one in found.ambiguities]
+    left = read_one(tmp_path, rate, "none", q=Q, fps=100.0, time_in_contact=UNEVEN)
+    assert left.times[-1] == pytest.approx(1.0)
+    assert left.ambiguities == ()
+
+
+def test_periods_that_are_asked_for_are_summed(tmp_path):
+    dt = np.resize([0.01, 0.02], 101)
+    found = read_one(tmp_path, None, "dt", q=Q, dt=dt)
+    assert found.times[-1] - found.times[0] == pytest.approx(dt[1:].sum())
+
+
+def test_periods_that_are_not_one_a_frame_are_no_number_and_can_be_left_unread(tmp_path):
+    with pytest.raises(FileFormatError, match=r"dt is no number.*--time-column none --rate HZ"):
+        read_one(tmp_path, q=Q, dt=np.full(100, 0.01))
+    found = read_one(tmp_path, 100.0, "none", q=Q, dt=np.full(100, 0.01))
+    assert found.times[-1] == pytest.approx(1.0)
+
+
+def test_one_joint_is_read_by_its_name(tmp_path):
+    found = read_one(tmp_path, 100.0, key=("foo",), foo=Q[:, 0])
+    np.testing.assert_array_equal(found.positions, Q[:, :1])

@@ -87,20 +87,28 @@ def test_times_of_one_name_that_differ_are_refused():
 
 def test_what_rises_is_asked_about_or_held_against_a_rate():
     columns = places(q=np.sin(T), n=np.arange(101.0), up=1.5 * T, frame=SKIPS)
-    (doubt,) = other_times("a", places(q=np.sin(T), up=T), None, of_anything=False).guessed
+    (doubt,) = other_times("a", places(q=np.sin(T), up=T), None, in_arrays=False).guessed
     assert doubt.option == "--time-column up"
     assert not doubt.guessed
-    for anything in (True, False):
-        found = other_times("a", columns, 20.0, of_anything=anything)
+    for in_arrays in (True, False):
+        found = other_times("a", columns, 20.0, in_arrays=in_arrays)
         assert (found.columns, found.unit) == ((3,), FRAME)
     del columns[3]
-    assert other_times("a", columns, 20.0, of_anything=False).columns == (2,)
+    assert other_times("a", columns, 20.0, in_arrays=False).columns == (2,)
 
 
-def test_of_arrays_of_anything_only_one_that_runs_as_the_rate_says_is_held_against_it():
+def test_of_arrays_only_one_that_runs_as_the_rate_says_is_held_against_it():
     columns = places(q=np.sin(T), up=1.5 * T)
-    assert other_times("a", columns, 20.0, of_anything=True).columns == ()
-    assert other_times("a", columns, 15.0, of_anything=True).columns == (1,)
-    assert other_times("a", columns, None, of_anything=True).columns == (1,)
-    assert other_times("a", places(up=T, down=2 * T), None, of_anything=True).columns == ()
-    assert other_times("a", places(frame=2 * T), None, of_anything=True).columns == ()
+    assert other_times("a", columns, 20.0, in_arrays=True).columns == ()
+    assert other_times("a", columns, 15.0, in_arrays=True).columns == (1,)
+    assert other_times("a", columns, None, in_arrays=True).columns == (1,)
+    assert other_times("a", places(up=T, down=2 * T), None, in_arrays=True).columns == ()
+    assert other_times("a", places(frame=2 * T), None, in_arrays=True).columns == ()
+
+
+def test_what_is_called_a_time_and_rises_unevenly_is_asked_about():
+    uneven = np.append(T, T[-1] + 3.0)
+    (doubt,) = find_times("a", places(time_in_contact=uneven), ()).guessed
+    assert (doubt.option, doubt.guessed) == ("--time-column time_in_contact", False)
+    assert find_times("a", places(time_in_contact=T), ()).guessed == ()
+    assert find_times("a", places(time_in_contact=uneven), (0,)).guessed == ()

@@ -80,12 +80,10 @@ def declared_rate(
         is_period, unit = says_period(called), split_unit(called, SECONDS)[1]
         if OTHER_NAMES.search(place) or not (is_period or _RATE.fullmatch(called.lower())):
             continue
-        if np.size(value) > 1 and is_periods(called, np.asarray(value)):
-            continue  # of each frame, and so no rate
         if np.size(value) != 1 or np.asarray(value).dtype.kind not in "fiu":
             raise FileFormatError(
                 f"{where}: {name} is no number; expected times t, or dt, or rate: mend it, or "
-                "leave it unread with --time-column none"
+                "leave it unread with --time-column none --rate HZ"
             )
         number = float(value) * SECONDS[unit or "s"]
         found[name] = 1 / number if is_period and number else number
@@ -266,16 +264,27 @@ def clock_among(
     called = [name for name in arrays if split_unit(name, SECONDS)[0] in _CALLED]
     fit = {n: own for n, own in every.items() if own[1].shape == (count,) and n not in motion}
     found = find_times(where, fit | {name: every[name] for name in called}, called)
-    timed = asked is not None and found.columns
-    own = {} if timed else declared_rate(where, said or {}, options.rate)
-    if asked is not None:
-        found = FoundTimes((asked,) if asked in arrays else ())
+    timed = asked not in (None, NO_COLUMN) and found.columns
+    said = {n: v for n, v in (said or {}).items() if not _are_periods(n, v, count)}
+    if asked == NO_COLUMN and options.rate is not None:  # what is no number is left unread
+        said = {n: v for n, v in said.items() if np.size(v) == 1}
+    own = {} if timed else declared_rate(where, said, options.rate)
+    if asked is not None and asked in arrays:
+        found = FoundTimes((asked,), summed=_are_periods(asked, arrays[asked], count))
+    elif asked == NO_COLUMN:
+        found = FoundTimes()
     elif not found.columns:
         rate = options.rate or own.get("own_rate")
-        found = other_times(where, fit, rate, of_anything=True)
+        found = other_times(where, fit, rate, in_arrays=True)
     if not found.columns:
         return options.clock(episode, count, **own)
     return clock_at(f"{where}: {episode}", episode, count, found, every, options, **own)
+
+
+def _are_periods(name: str, values: Any, count: int) -> bool:
+    """Whether values, of which each frame has one, are the times since the frame before."""
+    stamps = np.asarray(values)
+    return stamps.shape == (count,) and is_periods(name.rpartition(".")[2], stamps)
 
 
 def clock_at(

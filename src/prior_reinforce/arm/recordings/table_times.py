@@ -135,7 +135,7 @@ def time_columns(
     if found.columns:
         return found
     rate = options.rate or _declared(table, above, options).get("own_rate")
-    found = other_times(table.where, free, rate, of_anything=False)
+    found = other_times(table.where, free, rate, in_arrays=False)
     return found if len(table.names) > 1 else FoundTimes()
 
 

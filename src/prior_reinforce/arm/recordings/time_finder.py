@@ -69,38 +69,46 @@ def find_times(where: object, columns: Columns, called: Collection[Any]) -> Foun
     """Return the times among columns, none of which is a joint, by what their names say.
 
     The first counts of those that are `called` so for certain, or rise steadily and say in some
-    language that they are a time; else of those that say so and rise or fall at all; else periods,
-    which are summed. FileFormatError if columns of one name are times that differ.
+    language that they are a time; else of those that say so and rise, which is asked about, or
+    fall; else periods, which are summed. FileFormatError if columns of one name are times that
+    differ.
     """
     times = [*called, *(i for i, each in columns.items() if tells_time(*each))]
-    upwards = [
+    increasing = [
         i
         for i, (name, own) in columns.items()
         if says_time(name) and len(own) > 1 and np.all(np.diff(own.astype(float), axis=0) > 0)
     ]
-    times = times or upwards or [i for i, each in columns.items() if counts_down(*each)]
+    is_sure = bool(times)
+    times = times or increasing or [i for i, each in columns.items() if counts_down(*each)]
     if not times:
         periods = tuple(i for i, each in columns.items() if is_periods(*each))
         return FoundTimes(periods[:1], summed=bool(periods))
     _refuse_several(where, [own for i, own in columns.items() if i in times])
     skipping = [i for i, (_, own) in columns.items() if skips_frames(own)]
-    first, *held = dict.fromkeys([*times, *upwards, *skipping])
-    return FoundTimes((first,), tuple(held))
+    first, *held = dict.fromkeys([*times, *increasing, *skipping])
+    doubts: tuple[Ambiguity, ...] = ()
+    if not is_sure and first in increasing and len(columns[first][1]) > 2:
+        name, steps = columns[first][0], np.diff(columns[first][1].astype(float))
+        what = f"{where}: {name} is called a time, but steps by {steps.min():g} to {steps.max():g}"
+        what += " (if it is not that of the frames: --time-column none, and --rate HZ)"
+        doubts = (Ambiguity(what, f"--time-column {shlex.quote(name)}", guessed=False),)
+    return FoundTimes((first,), tuple(held), guessed=doubts)
 
 
 def other_times(
-    where: object, columns: Columns, rate: float | None, *, of_anything: bool
+    where: object, columns: Columns, rate: float | None, *, in_arrays: bool
 ) -> FoundTimes:
     """Return what may be the times where no name says so: what rises steadily.
 
     If a rate is known, that, or a count that skips frames, is held against it; else the first is
-    asked about. Columns `of_anything` count only if one of them rises and is called no counter, and
-    beside a rate if that runs nearly as fast.
+    asked about. Of `in_arrays`, which may hold anything, exactly one must rise that is called no
+    counter, and beside a rate run nearly as fast.
     """
     rising = [i for i, (_, own) in columns.items() if rises(own)]
-    if rate is not None or of_anything:  # what counts frames one by one says nothing
+    if rate is not None or in_arrays:  # what counts frames one by one says nothing
         rising = [i for i in rising if not counts_all(columns[i][1])]
-    if of_anything:
+    if in_arrays:
         rising = [i for i in rising if not COUNTER.search(columns[i][0].lower())]
         rising = [i for i in rising if rate is None or _runs_at(rate, columns[i][1])]
         rising = rising if len(rising) == 1 else []
