@@ -271,7 +271,7 @@ def _episode(
         named=is_named,
         remarks=tuple(remarks),
         units=tuple(table.units[i] or u for i, u in zip(channels, units, strict=True)),
-        ambiguities=(*guessed, *times.guessed, *clock.ambiguities, *(twins or ())),
+        ambiguities=(*guessed, *clock.ambiguities, *(twins or ())),
         columns=own if table.named else (),
         beside=columns_beside(
             [called[i] for i in (*channels, *rest)],
