@@ -1,9 +1,8 @@
 """Tables as people export them: CSV of any dialect.
 
 Encoding, delimiter and decimal sign are inferred from its lines: the pair that makes most
-cells numbers, in rows of one width. (`csv.Sniffer` knows no decimal comma.) Comment lines (`#`,
-`%`, `//`) are dropped, except one right above the first row that names the columns, as
-`numpy.savetxt` writes it.
+cells numbers, in rows of one width. (`csv.Sniffer` knows no decimal comma.) Of comment lines (`#`,
+`%`, `//`) only one right above the first row counts: `numpy.savetxt` names the columns there.
 """
 
 from __future__ import annotations
@@ -446,7 +445,6 @@ def is_unnamed(name: str) -> bool:
 
 def _is_padding(name: str, column: Sequence[str]) -> bool:
     """Whether a column is what a trailing delimiter leaves, or the running count of pandas."""
-    is_index = is_unnamed(name) or name == "index"
-    if not any(column):
-        return is_index or name.startswith("column ")
-    return is_index and list(column) == [str(i) for i in range(len(column))]
+    if is_unnamed(name) or name == "index":
+        return not any(column) or list(column) == [str(i) for i in range(len(column))]
+    return not any(column) and name.startswith("column ")
