@@ -516,9 +516,8 @@ def test_a_refusal_names_the_goal_what_was_asked_for_and_that_it_is_too_far():
     with pytest.raises(RobotLimitError) as refused:
         session.ask()
     assert str(refused.value).startswith(
-        "no plan for the goal 200 cm ahead, 10 cm left, for which the motion to 201 cm ahead, 10 "
-        "cm left was to be made, which lies far outside the demonstrations (choose one nearer to "
-        "them): "
+        "no plan for the goal 200 cm ahead, 10 cm left, for which the plan would aim at 201 cm "
+        "ahead, 10 cm left, which lies far outside the demonstrations (choose one nearer to them): "
     )
 
 

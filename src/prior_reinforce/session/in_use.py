@@ -220,7 +220,7 @@ class InUse:
         place, at = (say_place(point, form) for point in (goal, condition))
         said = f"no plan for the goal {place}"
         if at != place:
-            said += f", for which the motion to {at} was to be made"
+            said += f", for which the plan would aim at {at}"
         if np.any(self.demonstrations.far_outside(goal)):
             said += ", which lies far outside the demonstrations (choose one nearer to them)"
         return said
