@@ -343,3 +343,9 @@ def test_periods_that_are_not_one_a_frame_are_no_number_and_can_be_left_unread(t
 def test_one_joint_is_read_by_its_name(tmp_path):
     found = read_one(tmp_path, 100.0, key=("foo",), foo=Q[:, 0])
     np.testing.assert_array_equal(found.positions, Q[:, :1])
+
+
+def test_outcomes_are_not_taken_for_the_motion_that_is_missing(tmp_path):
+    np.savez(tmp_path / "a.npz", dt=0.01, outcome=np.arange(6.0)[:, None] ** [1, 2])
+    with pytest.raises(FileFormatError, match=r"no array q.*--key"):
+        read_recordings(tmp_path)
