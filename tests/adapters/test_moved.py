@@ -155,6 +155,17 @@ def test_a_table_that_was_bumped_is_hit_again_in_three_throws(size):
     assert "moved" in arm.adapter.expect(GOALS[0], GOALS[0], 0.015).remark
 
 
+def test_a_first_hit_nearby_does_not_make_a_far_goal_sure():
+    arm = Arm(gain=np.eye(2))
+    near, far = arm.shown.outcomes_seen[0] + [0.01, 0.01], 1.3 * arm.shown.outcomes_seen[0]
+    assert arm.trials(near) == 1
+    condition = arm.adapter.propose(far)
+    assert arm.adapter.expect(condition, far, TOLERANCE).p_hit < 0.7
+    assert arm.trials(far) == 1
+    condition = arm.adapter.propose(far)
+    assert arm.adapter.expect(condition, far, TOLERANCE).p_hit > 0.9
+
+
 def test_after_a_change_that_is_said_less_is_sure():
     arm = Arm()
     for goal in GOALS:
@@ -386,15 +397,22 @@ def test_p_hit_is_the_share_of_sampled_outcomes_within_the_tolerance():
     arm = Arm()
     arm.throw(GOALS[0], by_eye)
     moved, goal, rng = arm.adapter._trials, GOALS[1], np.random.default_rng(0)
-    condition = arm.adapter.propose(goal)
-    radius, total = np.array([0.02, 0.05]), 0.0
-    for h, share in enumerate(moved.belief.probabilities):
-        there = moved.belief.outcomes(h, moved._places(condition[None], goal[None]))
-        covariance = moved.belief.spread(h, there)[0] + np.diag((radius / 3) ** 2)
-        drawn = rng.multivariate_normal(there.mean[0] - goal, covariance, size=50_000)
-        total += share * np.mean(np.linalg.norm(drawn / radius, axis=1) <= 1.0)
+    condition, belief = arm.adapter.propose(goal), moved.belief
+    radius, hits, total = np.array([0.02, 0.05]), 0.0, 0.0
+    at = moved._places(condition[None], goal[None])
+    missed = belief.memory.bare_misses(np.zeros((1, 2)))
+    assert len(missed.goals) == 1  # its words alone may have been a hit
+    for h, share in enumerate(belief.probabilities):
+        both = belief.outcomes(h, missed), belief.outcomes(h, at)
+        blocks = [[belief.covariance(h, a, b)[0, :, 0] for b in both] for a in both]
+        covariance = np.block(blocks) + np.diag(np.tile((radius / 3) ** 2, 2))
+        mean = np.concatenate([both[0].mean[0] - missed.goals[0], both[1].mean[0] - goal])
+        drawn = rng.multivariate_normal(mean, covariance, size=50_000).reshape(-1, 2, 2)
+        off = np.linalg.norm(drawn / [missed.missed_by[0], radius], axis=2)
+        total += share * np.mean(off[:, 0] > 1.0)
+        hits += share * np.mean((off[:, 0] > 1.0) & (off[:, 1] <= 1.0))
     said = arm.adapter.p_hit(condition[None], goal[None], radius)[0]
-    assert said == pytest.approx(total, abs=0.03)
+    assert said == pytest.approx(hits / total, abs=0.03)
 
 
 def test_what_is_kept_in_a_file_goes_on_as_if_never_put_away(tmp_path):
