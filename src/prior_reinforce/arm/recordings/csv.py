@@ -206,7 +206,7 @@ def _refuse_second_log(table: Table, times: Times) -> None:
         if 0 < row < len(table) and times[row] <= times[row - 1]:
             raise FileFormatError(
                 f"{table.where}, line {line}: the head comes again: two logs in one file; keep the "
-                "part that is this motion, or take that line out if the motion goes on"
+                "part that is this motion, or leave that line out if the motion goes on"
             )
 
 
