@@ -155,6 +155,17 @@ def test_a_table_that_was_bumped_is_hit_again_in_three_throws(size):
     assert "moved" in arm.adapter.expect(GOALS[0], GOALS[0], 0.015).remark
 
 
+@pytest.mark.parametrize("size", [0.1, 0.15, -0.15])
+def test_a_bump_after_the_first_trial_is_not_taken_for_a_tempo_that_works_the_other_way(size):
+    arm = Arm(gain=((1.2, 0.0), (0.0, 1.0)))
+    assert arm.trials(GOALS[0], seen=by_eye) == 1
+    arm.moved = np.array([size, 0.0])
+    goal = np.array([1.0, 0.05])
+    (_, before), (_, after) = arm.throw(goal, by_eye), arm.throw(goal, by_eye)
+    assert np.linalg.norm(after) < np.linalg.norm(before)
+    assert arm.trials(goal, seen=by_eye) <= 2
+
+
 def test_a_first_hit_nearby_does_not_make_a_far_goal_sure():
     arm = Arm(gain=np.eye(2))
     near, far = arm.shown.outcomes_seen[0] + [0.01, 0.01], 1.3 * arm.shown.outcomes_seen[0]
