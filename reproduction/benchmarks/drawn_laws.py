@@ -1,6 +1,6 @@
 """P(hit) of `BayesianAdapter` from one demonstration, where distances follow drawn laws.
 
-    python benchmarks/drawn_laws.py [--afternoons 120]
+    python reproduction/benchmarks/drawn_laws.py [--afternoons 120]
 
 No physics: an outcome is where the symmetry moves the demonstration's to, in its chart, but for a
 law of distance of a drawn exponent and curvature, offsets that stay, and executions that vary by an
