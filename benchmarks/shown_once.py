@@ -55,7 +55,7 @@ class Afternoon:
             condition = self.adapter.propose(goal)
             taken = time.process_time() - start
             expected = self.adapter.expect(condition, goal, tolerance)
-            assert expected is not None
+            assert expected.p_hit is not None
             self.remarks.append(expected.remark)
             try:
                 plan = self.generator.generate(condition[None])

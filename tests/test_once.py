@@ -60,8 +60,8 @@ def test_an_axis_that_is_wrong_is_left_for_its_rival_and_that_is_said():
     reached = _by_eye(task, shown.with_symmetry(replace(base, rival=task.symmetry)), goals)
     assert np.mean([goal.solved_at for goal in reached]) <= 4
     taken = [trial for goal in reached for trial in goal.trials if trial.model]
-    assert "did not follow" in taken[0].remark
-    assert "(0.43, 0.0)" in taken[0].remark
+    assert "did not follow" in taken[0].expected.remark
+    assert "(0.43, 0.0)" in taken[0].expected.remark
 
 
 @pytest.mark.slow
@@ -71,7 +71,9 @@ def test_a_rival_is_not_taken_up_where_nothing_is_wrong():
     rival = pr.make_task("curling").symmetry
     demos = shown.with_symmetry(replace(shown.symmetry, rival=rival))
     reached = _by_eye(task, demos, task.sample_goals(12, np.random.default_rng(7)))
-    assert not any(trial.model or trial.remark for goal in reached for trial in goal.trials)
+    assert not any(
+        trial.model or trial.expected.remark for goal in reached for trial in goal.trials
+    )
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ import pytest
 from rich.console import Console
 from rich.progress import Progress
 
+from prior_reinforce.adapters.base import Expectation
 from prior_reinforce.commands.live import (
     LiveView,
     drawing_progress,
@@ -30,7 +31,7 @@ def trial(number, condition, error_seen, hit=False, p_hit=None):
         condition=np.array(condition),
         error_seen=np.array(error_seen),
         hit=hit,
-        p_hit=p_hit,
+        expected=Expectation(p_hit),
     )
 
 

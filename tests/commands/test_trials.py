@@ -108,7 +108,7 @@ def test_ask_says_what_the_trial_may_expect(run, folder):
     out = run("ask", folder)[1]
     (trial,) = trials_in(folder)
     assert "trial 1: aims at 90 cm ahead, 5 cm left\n" in out
-    assert f"a hit is possible; about {trial.expected_trials:.1f} trials" in out
+    assert f"a hit is possible; about {trial.expected.trials:.1f} trials" in out
     run("tell", folder, 1, "5 cm long")
     assert re.search(r"trial 2: aims at .* \(.* short.* of the goal, so", run("ask", folder)[1])
     run("void", folder, 2)

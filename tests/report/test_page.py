@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from prior_reinforce.adapters.base import Expectation
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.report import page, record_film, write_report
 from prior_reinforce.report.record import CheckRow
@@ -144,7 +145,7 @@ def test_what_is_known_beside_the_trials_is_on_the_page(tmp_path):
     Image.new("RGB", (8, 8)).save(photograph)
     record = told([0.05, 0.0], [0.02, 0.0])
     first, second = record.trials
-    first = replace(first, p_hit=0.34, expected_trials=1.9)
+    first = replace(first, expected=Expectation(0.34, 1.9))
     record = replace(
         record,
         trials=(first, replace(second, hit=True)),

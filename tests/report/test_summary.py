@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from prior_reinforce.adapters.base import Expectation
 from prior_reinforce.report.summary import (
     headline,
     outcome_line,
@@ -44,7 +45,7 @@ def test_what_went_wrong_with_an_execution_is_said_beside_what_was_seen():
 
 def test_how_many_trials_are_to_go_is_left_out_where_nobody_knows():
     told = record([0.05, 0.0])
-    trial = replace(told.trials[0], p_hit=1e-3)
+    trial = replace(told.trials[0], expected=Expectation(1e-3))
     (row,) = trial_rows(replace(told, trials=(trial,)))
     assert row.expected == "unlikely"
 

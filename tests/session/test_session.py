@@ -210,7 +210,7 @@ def test_misses_alone_make_the_default_adapter_try_beside_them():
     np.testing.assert_allclose(tried[0], GOAL, atol=1e-9)
     apart = np.linalg.norm(tried[:, None] - tried, axis=2)[np.triu_indices(4, 1)]
     assert np.all((apart > 0.003) & (apart < 0.1))
-    p_hit = [trial.p_hit for trial in session.trials]
+    p_hit = [trial.expected.p_hit for trial in session.trials]
     assert 0.0 < p_hit[3] < p_hit[0]
 
 
@@ -370,12 +370,12 @@ def test_a_loss_that_keeps_plans_near_is_named_with_how_to_take_it_back():
     session.set_goal(GOAL)
     session.tell(session.ask().number, "lost")
     session.adapter._expect = lambda *of: Expectation(0.9, 1.1, nearer=True)
-    assert "since trial 2 was lost; void 2 if" in session.ask().remark
+    assert "since trial 2 was lost; void 2 if" in session.ask().expected.remark
 
 
 def test_a_surprise_is_said_at_once_with_what_to_do_about_it():
     session = carrying()
-    expected = Expectation(0.9, 1.1, np.array([0.01, 0.0]), np.array([0.01, 0.02]))
+    expected = Expectation(0.9, 1.1, (0.01, 0.0), (0.01, 0.02))
     session.adapter._expect = lambda *of: expected
     session.ask()
     told = session.tell(1, Reading.measured([0.21, 0.0], 0.0))
@@ -413,11 +413,11 @@ def test_the_adapter_hears_of_new_hardware_between_the_trials_before_and_after()
 
 
 def test_what_was_expected_is_kept_with_the_trial(session):
-    assert session.ask().p_hit is None
+    assert session.ask().expected == Expectation()
     expecting = carrying()
     trial = expecting.ask()
-    assert (trial.p_hit, trial.expected_trials) == (0.25, 2.5)
-    assert carrying(expecting.log).open_trial.p_hit == 0.25
+    assert trial.expected == Expectation(0.25, 2.5)
+    assert carrying(expecting.log).open_trial.expected.p_hit == 0.25
 
 
 def test_a_goal_waits_for_the_open_trial(session):
@@ -479,13 +479,15 @@ def test_where_a_correction_does_not_pass_the_last_plan_that_does_is_tried_once(
     trial = session.ask()
     assert 0.99 < trial.condition[0] <= 1.0
     np.testing.assert_array_equal(trial.plan[0], trial.condition)
-    assert trial.beyond
-    assert trial.remark.startswith("moved only as far as passes, which may not do (1.2 is beyond")
+    assert trial.expected.beyond
+    assert trial.expected.remark.startswith(
+        "moved only as far as passes, which may not do (1.2 is beyond"
+    )
     session.tell(2, [-0.2, 0.0])
     with pytest.raises(RobotLimitError, match=r"trial 2 went as far as passes, and missed: demon"):
         session.ask()
     session.amend(2, [0.05, 0.0])
-    assert (session.ask().remark, session.ask().beyond) == ("", False)
+    assert session.ask().expected == Expectation()
 
 
 def test_a_plan_that_is_as_far_as_may_be_is_refused_once_it_missed():
@@ -495,7 +497,7 @@ def test_a_plan_that_is_as_far_as_may_be_is_refused_once_it_missed():
     session.adapter._expect = lambda *of: beyond
     session.adapter._propose = lambda goal: goal
     session.tell(session.ask().number, hit=False)
-    assert session.ask().beyond
+    assert session.ask().expected.beyond
     session.tell(session.ask().number, [0.001, 0.02])
     with pytest.raises(OutOfReachError, match="trial 2 made the same plan and missed: the goal is"):
         session.ask()

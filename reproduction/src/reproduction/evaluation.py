@@ -250,7 +250,7 @@ class Trials(OfTraining):
             "first_error": [float(np.linalg.norm(result.errors[0])) for result in results],
             "lost": [sum(not rollout.valid for rollout in result.rollouts) for result in results],
             "failed_readings": [result.failed_readings for result in results],
-            "p_hit": [[trial.p_hit for trial in result.trials] for result in results],
+            "p_hit": [[trial.expected.p_hit for trial in result.trials] for result in results],
         }
 
     def rows(self, result: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -69,7 +69,11 @@ class InSequence(Unit):
         trials = [trial for of_one in results for goal in of_one for trial in goal.trials]
         return {
             "solved_at": [[goal.solved_at or 0 for goal in of_one] for of_one in results],
-            "expected": [[trial.p_hit, trial.hit] for trial in trials if trial.p_hit is not None],
+            "expected": [
+                [trial.expected.p_hit, trial.hit]
+                for trial in trials
+                if trial.expected.p_hit is not None
+            ],
             "first_error": [[float(np.linalg.norm(g.errors[0])) for g in of] for of in results],
         }
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
+import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -24,17 +25,16 @@ _STATE = 3
 _Arrays = TypeVar("_Arrays")
 
 
-@dataclass(frozen=True, eq=False)
-class Expectation:
-    """What is expected of a trial before it is executed."""
+class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """What is expected of a trial before it is executed; empty where nothing is."""
 
-    p_hit: float
+    p_hit: float | None = None
     """Probability that it reaches the goal."""
-    trials: float | None
+    trials: float | None = None
     """Trials until the goal is reached, this one included; None if nobody knows."""
-    error: Point | None = None
-    """Expected error, outcome minus goal, shape (k,), in the outcomes' units; None if unknown."""
-    sd: Point | None = None
+    error: tuple[float, ...] | None = None
+    """Expected error, outcome minus goal, k numbers in the outcomes' units; None if unknown."""
+    sd: tuple[float, ...] | None = None
     """Its standard deviation, likewise."""
     remark: str = ""
     """What a person should know beforehand, in one line, such as that a symmetry does not hold."""
@@ -207,10 +207,8 @@ class Adapter(ABC):
         """Whether trials have left the symmetry that the demonstrations state, if they do."""
         return False
 
-    def expect(
-        self, condition: ArrayLike, goal: ArrayLike, tolerance: ArrayLike
-    ) -> Expectation | None:
-        """Return what is expected of a trial; None from adapters that expect nothing.
+    def expect(self, condition: ArrayLike, goal: ArrayLike, tolerance: ArrayLike) -> Expectation:
+        """Return what is expected of a trial; an empty one from adapters that expect nothing.
 
         Args:
             condition: c, mostly what was proposed.
@@ -269,9 +267,9 @@ class Adapter(ABC):
         """See `resume`; the adapter was started."""
         raise NotImplementedError(f"{type(self).__name__} keeps no state: tell it the trials")
 
-    def _expect(self, condition: Point, goal: Point, tolerance: Point) -> Expectation | None:
+    def _expect(self, condition: Point, goal: Point, tolerance: Point) -> Expectation:
         """See `expect`."""
-        return None
+        return Expectation()
 
     def _checked(
         self,

@@ -60,7 +60,8 @@ class LiveView:
         )
         aim = "aim at the goal" if off == nothing else f"aim {moved}{off}"
         shown = ("HIT", "bold green") if trial.hit else "a near miss" if seen == nothing else seen
-        chance = "" if trial.p_hit is None else f"hit {say_chance(trial.p_hit):<8}  "
+        p_hit = trial.expected.p_hit
+        chance = "" if p_hit is None else f"hit {say_chance(p_hit):<8}  "
         self._say(f"  trial {len(result.trials)}  {aim:<36} {chance}seen: ", shown)
 
     def end(self, result: GoalTrials) -> None:

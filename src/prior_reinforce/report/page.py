@@ -165,7 +165,7 @@ def _section(
         "rows": summary.trial_rows(record),
         "colours": [trial_colour(i, n, hit=trial.hit) for i, trial in enumerate(record.trials)],
         "knows_truth": _knows_truth(record),
-        "expects": any(trial.p_hit is not None for trial in record.trials),
+        "expects": any(trial.expected.p_hit is not None for trial in record.trials),
         "photographs": [(said, _file(folder, picture)) for said, picture in record.photographs],
         "strip": record.film and data_uri(record.film.strip),
         "video": record.film and _file(folder, record.film.video),

@@ -145,10 +145,10 @@ def say_distance(record: AdaptationRecord, distance: float) -> str:
 
 def _row(record: AdaptationRecord, i: int, trial: Trial) -> TrialRow:
     form, expected = record.format, ""
-    if trial.p_hit is not None:
-        expected = wording.say_chance(trial.p_hit)
-    if trial.expected_trials is not None:
-        expected += f", {wording.say_trials(trial.expected_trials).removeprefix('about ')}"
+    if trial.expected.p_hit is not None:
+        expected = wording.say_chance(trial.expected.p_hit)
+    if trial.expected.trials is not None:
+        expected += f", {wording.say_trials(trial.expected.trials).removeprefix('about ')}"
     aim = say_place(trial.condition, form)
     if in_words(form):
         aim = to_words(trial.condition - record.goal, form).replace("on the goal", "at the goal")

@@ -11,6 +11,7 @@ from typing import Any
 
 import msgspec
 
+from prior_reinforce.adapters.base import Expectation
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.readings import ReadingRecord
 
@@ -58,13 +59,8 @@ class Asked(Event, frozen=True):
     """Name of the model that generated the plan."""
     gate: dict[str, Any] | None = None
     """The gate's verdict as plain data (`Verdict.as_json`)."""
-    p_hit: float | None = None
-    expected_trials: float | None = None
-    expected_error: list[float] | None = None
-    expected_sd: list[float] | None = None
-    remark: str = ""
-    beyond: bool = False
-    """See `trials.Trial.beyond`."""
+    expected: Expectation = Expectation()
+    """See `trials.Trial.expected`."""
 
 
 class Told(Event, frozen=True):

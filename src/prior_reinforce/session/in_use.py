@@ -8,8 +8,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from msgspec.structs import replace
 
-from prior_reinforce.adapters.base import next_key
+from prior_reinforce.adapters.base import Expectation, next_key
 from prior_reinforce.adapters.memory import AGAIN
 from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.errors import (
@@ -26,7 +27,7 @@ from prior_reinforce.session.trials import Goal, Log, State, Verdict
 from prior_reinforce.wording import say_place
 
 if TYPE_CHECKING:
-    from prior_reinforce.adapters.base import Adapter, Expectation
+    from prior_reinforce.adapters.base import Adapter
     from prior_reinforce.generators.base import Generator
     from prior_reinforce.plans.motions import Demonstrations
 
@@ -101,7 +102,7 @@ class InUse:
             getattr(adapter, what)(*arguments)
         return adapter
 
-    def expected(self, state: State, condition: Point) -> Expectation | None:
+    def expected(self, state: State, condition: Point) -> Expectation:
         """What the adapter expects of the next trial."""
         goal = latest_goal(state)
         return self.adapter.expect(condition, goal.goal, goal.tolerance)
@@ -114,28 +115,19 @@ class InUse:
         `limited` says by what limits it falls short of what the adapter asked for.
         """
         expected = self.expected(state, condition)
-        p_hit = trials = error = sd = None
-        if expected is not None:
-            p_hit, trials = expected.p_hit, expected.trials
-            error, sd = expected.error, expected.sd
+        remarks = filter(None, (limited, self._remark(state, expected)))
+        beyond = bool(limited) or (expected.beyond and not expected.nearer)
         return Asked(
             trial=len(state.trials) + 1,
             goal=latest_goal(state).number,
             condition=condition.tolist(),
             model=self.names[0],
             gate=None if verdict is None else verdict.as_json(),
-            p_hit=p_hit,
-            expected_trials=trials,
-            expected_error=_as_list(error),
-            expected_sd=_as_list(sd),
-            remark="; ".join(filter(None, (limited, self._remark(state, expected)))),
-            beyond=bool(limited or (expected and expected.beyond and not expected.nearer)),
+            expected=replace(expected, remark="; ".join(remarks), beyond=beyond),
         )
 
-    def _remark(self, state: State, expected: Expectation | None) -> str:
+    def _remark(self, state: State, expected: Expectation) -> str:
         """What a person should know before a trial."""
-        if expected is None:
-            return self._taken_back()
         if expected.nearer:
             goal = latest_goal(state)
             n = [
@@ -209,7 +201,7 @@ class InUse:
             )
         if verdict is not None and (n := _missed(state, wanted)):
             expected = self.expected(state, wanted)
-            if expected is not None and expected.beyond:
+            if expected.beyond:
                 raise OutOfReachError(f"trial {n} made the same plan and missed: {expected.remark}")
         return wanted, plan, verdict, ""
 
@@ -274,10 +266,6 @@ def _loaded(given: Any) -> Any:
     from prior_reinforce.generators.base import Generator
 
     return given() if callable(given) and not isinstance(given, (Generator, Adapter)) else given
-
-
-def _as_list(numbers: Point | None) -> list[float] | None:
-    return None if numbers is None else numbers.tolist()
 
 
 def generated(generators: Sequence[Generator], conditions: Sequence[Point]) -> list[Frames]:

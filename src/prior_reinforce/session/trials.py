@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from prior_reinforce.adapters.base import Expectation
 from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.errors import (
     InvalidFeedbackError,
@@ -110,18 +111,8 @@ class Trial:
     """Whether it is voided, and was told until then: a person may have meant another trial."""
     outdated: bool = False
     """Whether a reading that it was planned from was amended or voided while it waited."""
-    p_hit: float | None = None
-    """Probability that it hits, as its adapter saw it; None from one that expects nothing."""
-    expected_trials: float | None = None
-    """Trials until the goal is reached, this one included, likewise."""
-    expected_error: Point | None = None
-    """Error that was expected of it, outcome minus goal, likewise."""
-    expected_sd: Point | None = None
-    """Its standard deviation, likewise."""
-    remark: str = ""
-    """What its adapter had to say beforehand (`Expectation.remark`)."""
-    beyond: bool = False
-    """Whether plans may not be moved as far as its goal: only a nearer demonstration helps."""
+    expected: Expectation = field(default_factory=Expectation)
+    """What its adapter expected of it; `beyond` also where the gate lets no plan so far."""
     model: str = ""
     """Which model planned it: the name of its folder in a workspace, else empty."""
     gate: dict[str, Any] | None = None
@@ -151,10 +142,11 @@ class Trial:
     @property
     def surprise(self) -> str:
         """What is odd about what was told of it, and what to do about that; empty where nothing."""
-        if self.reading is None or self.expected_error is None or self.expected_sd is None:
+        reading, error, sd = self.reading, self.expected.error, self.expected.sd
+        if reading is None or error is None or sd is None:
             return ""
-        low, high = self.reading.low - self.expected_error, self.expected_error - self.reading.high
-        off = np.maximum(np.maximum(low, high), 0.0) / np.hypot(self.expected_sd, self.reading.sd)
+        low, high = reading.low - error, error - reading.high
+        off = np.maximum(np.maximum(low, high), 0.0) / np.hypot(sd, reading.sd)
         sds, n = float(np.linalg.norm(off)), self.number
         if sds < _NEWS:
             return ""
@@ -290,11 +282,17 @@ class State:
                     raise ValueError(f"goal {event.goal} is not the latest of {len(self.goals)}")
                 if len(event.condition) != self.goals[event.goal - 1].goal.size:
                     raise ValueError("the condition has another length than the goal")
-                known = {name: getattr(event, name) for name in Asked.__struct_fields__}
-                for name in ("condition", "expected_error", "expected_sd"):
-                    known[name] = None if known[name] is None else _read_only(known[name])
-                number, goal = known.pop("trial"), known.pop("goal")
-                self.trials.append(Trial(number, goal, asked_at=time, **known))
+                self.trials.append(
+                    Trial(
+                        event.trial,
+                        event.goal,
+                        _read_only(event.condition),
+                        expected=event.expected,
+                        model=event.model,
+                        gate=event.gate,
+                        asked_at=time,
+                    )
+                )
             case Amended():
                 if not self.trial(event.trial).amendable:
                     raise ValueError(f"trial {event.trial} has not been told")

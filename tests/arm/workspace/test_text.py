@@ -3,7 +3,9 @@
 from dataclasses import replace
 
 import pytest
+from msgspec import structs
 
+from prior_reinforce.adapters.base import Expectation
 from prior_reinforce.arm.workspace import text
 from prior_reinforce.arm.workspace.events import Moving
 from prior_reinforce.arm.workspace.text import (
@@ -48,10 +50,14 @@ def test_trials_that_are_not_shown_are_counted(workspace):
 def test_advice_is_left_out_where_a_remark_has_given_it_in_whatever_words(workspace):
     for error in (0.2, -0.2, 0.2):
         tell(workspace, ask(workspace).number, [error, 0.0])
-    poor = replace(ask(workspace), p_hit=0.01, remark="too far: demonstrate near it")
+    poor = replace(
+        ask(workspace), expected=Expectation(0.01, remark="too far: demonstrate near it")
+    )
     advice = "\n".join(say_expectation(workspace.standing, poor))
     assert "what would help" in advice
-    told = say_expectation(workspace.standing, replace(poor, beyond=True))
+    told = say_expectation(
+        workspace.standing, replace(poor, expected=structs.replace(poor.expected, beyond=True))
+    )
     assert "what would help" not in "\n".join(told)
 
 
@@ -78,7 +84,7 @@ def test_a_goal_far_outside_may_be_refused_and_a_nearer_one_is_named(workspace):
 
 
 def test_how_many_trials_are_to_go_is_left_out_where_nobody_knows(workspace):
-    trial = replace(ask(workspace), p_hit=1e-8, expected_trials=None)
+    trial = replace(ask(workspace), expected=Expectation(1e-8))
     assert say_expectation(workspace.standing, trial)[0] == "a hit is unlikely"
 
 

@@ -140,7 +140,7 @@ def test_new_hardware_is_noted_and_what_is_known_is_believed_less(workspace):
     anew = ask(workspace)
     assert (known.condition - shifted.goal)[0] < -0.06
     np.testing.assert_allclose(anew.condition, known.condition, atol=0.005)
-    assert anew.p_hit < 0.5 * known.p_hit
+    assert anew.expected.p_hit < 0.5 * known.expected.p_hit
     assert "another ball" in describe(workspace)
 
 

@@ -62,27 +62,27 @@ def _say_trial(now: Standing, trial: Trial) -> str:
 
 def say_expectation(now: Standing, trial: Trial) -> list[str]:
     """Say what the adapter expected of a trial, and after poor ones what would help."""
-    state = now.state
-    if trial.p_hit is None:
+    state, expected = now.state, trial.expected
+    if expected.p_hit is None:
         return []
-    lines = [f"a hit is {say_chance(trial.p_hit)}"]
-    if trial.expected_trials is not None:
-        lines[0] += f"; {say_trials(trial.expected_trials)} trials to go"
-    if trial.remark:
-        lines.append(trial.remark)
+    lines = [f"a hit is {say_chance(expected.p_hit)}"]
+    if expected.trials is not None:
+        lines[0] += f"; {say_trials(expected.trials)} trials to go"
+    if expected.remark:
+        lines.append(expected.remark)
     told = [known for known in state.trials if known.stage is Stage.TOLD]
     shown, moved = state.demonstrations, now.manifest.symmetry
-    if not told and shown is not None and shown.n == 1 and moved and trial.expected_sd is not None:
+    if not told and shown is not None and shown.n == 1 and moved and expected.sd is not None:
         form = now.manifest.outcome_format
         sd = ", ".join(
             f"{name} +- {100 * value:.0f} cm" if unit == "m" else f"{name} +- {value:.2g} {unit}"
-            for name, value, unit in zip(form.names, trial.expected_sd, form.units, strict=True)
+            for name, value, unit in zip(form.names, expected.sd, form.units, strict=True)
         )
         lines.append(f"this trial teaches how {moved.distance} changes the distance; expect {sd}")
     if told and told[-1].surprise:
         lines.append(f"trial {told[-1].number} was {told[-1].surprise}")
     missed = sum(known.goal_number == trial.goal_number for known in told)
-    poor = trial.p_hit < _POOR_CHANCE and not trial.beyond
+    poor = expected.p_hit < _POOR_CHANCE and not expected.beyond
     if missed >= _POOR_TRIALS and not state.solved and poor:
         lines.append(
             "what would help: a demonstration near this goal, or a finer look at the next trial "

@@ -220,6 +220,7 @@ class AdviceView(View, frozen=True):
 def trial_view(now: Standing, store: Store, trial: Trial) -> TrialView:
     """Return a trial as plain data."""
     reading, seen, outcome = trial.reading, None, None
+    p_hit, to_go = trial.expected.p_hit, trial.expected.trials
     file = store.plan_file(now.state.plan_files[trial.number])
     if reading is not None:
         seen = say_reading(reading, now.manifest.outcome_format)
@@ -238,10 +239,10 @@ def trial_view(now: Standing, store: Store, trial: Trial) -> TrialView:
         said=reading.said or None if reading is not None else None,
         hit=trial.hit if reading is not None else None,
         reason=trial.note or None,
-        p_hit=trial.p_hit,
-        chance=None if trial.p_hit is None else say_chance(trial.p_hit),
-        expected_trials=trial.expected_trials,
-        to_go=None if trial.expected_trials is None else say_trials(trial.expected_trials),
+        p_hit=p_hit,
+        chance=None if p_hit is None else say_chance(p_hit),
+        expected_trials=to_go,
+        to_go=None if to_go is None else say_trials(to_go),
         surprise=trial.surprise or None,
         outdated=trial.outdated,
         model=trial.model,
