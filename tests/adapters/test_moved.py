@@ -434,7 +434,7 @@ def test_what_is_kept_in_a_file_goes_on_as_if_never_put_away(tmp_path):
     arm.adapter.observe(np.array([1.3, 0.0]), GOALS[3], Reading.only(False, 2, lost=True))
     arm.adapter.state().save(tmp_path / "state.npz")
     resumed = BayesianAdapter()
-    resumed.resume(arm.shown, arm.adapter.key, State.load(tmp_path / "state.npz"))
+    resumed.resume(arm.shown, State.load(tmp_path / "state.npz"))
     for goal in GOALS[3:]:
         condition, error = arm.throw(goal, by_eye)
         np.testing.assert_array_equal(resumed.propose(goal), condition)

@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, ClassVar, TypeVar
 
@@ -52,15 +52,18 @@ class State:
     """Of JSON types."""
     arrays: dict[str, np.ndarray]
     """Of numbers."""
+    key: str = ""
+    """`Adapter.key`, which `Adapter.state` adds to what a member says."""
 
     def made(self, kind: type[_Arrays]) -> _Arrays:
         """Make an object that is nothing but arrays of its fields' names."""
         return kind(*(self.arrays[field.name] for field in fields(kind)))  # type: ignore[arg-type]
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an `.npz`: the arrays and a JSON text."""
+        """Write an `.npz`: the arrays, a JSON text and the key."""
+        texts = {"facts": json.dumps(self.facts), "key": self.key}
         with open(path, "wb") as file:
-            np.savez(file, **self.arrays, facts=np.array(json.dumps(self.facts)))  # type: ignore[arg-type]
+            np.savez(file, **self.arrays, **texts)  # type: ignore[arg-type]
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> State:
@@ -70,8 +73,9 @@ class State:
             FileFormatError: The file is no such `.npz`.
         """
         with open_npz(Path(path), "delete it: trials are then told again") as archive:
-            arrays = {name: archive[name] for name in archive.files if name != "facts"}
-            return cls(json.loads(str(archive["facts"])), arrays)
+            arrays = {name: archive[name] for name in archive.files}
+            facts, key = (str(arrays.pop(name)) for name in ("facts", "key"))
+            return cls(json.loads(facts), arrays, key)
 
 
 def next_key(
@@ -150,20 +154,20 @@ class Adapter(ABC):
         """
         if self._outcome_dim is None:
             raise NotFittedError(f"{type(self).__name__} knows nothing yet; call start first")
-        return self._state()
+        state = self._state()
+        return None if state is None else replace(state, key=self._key)
 
-    def resume(self, demonstrations: Demonstrations, key: str, state: State) -> None:
+    def resume(self, demonstrations: Demonstrations, state: State) -> None:
         """Begin with what `state` returned of an adapter with the same settings.
 
         Args:
             demonstrations: Those that it was started with.
-            key: Its `key`.
             state: Its `state`.
         """
         self.start(demonstrations)
         self._key = ""
         self._resume(state)
-        self._key = key
+        self._key = state.key
 
     def propose(self, goal_seen: ArrayLike) -> Point:
         """Return the condition to try next for a goal: c = M(g).

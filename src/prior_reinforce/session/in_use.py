@@ -94,8 +94,8 @@ class InUse:
             keys.append(next_key(keys[-1], what, *arguments))
         if adapter.key not in keys:
             kept = log.kept_adapter()
-            if kept is not None and kept[0] in keys:
-                adapter.resume(self.demonstrations, *kept)
+            if kept is not None and kept.key in keys:
+                adapter.resume(self.demonstrations, kept)
             else:
                 adapter.start(self.demonstrations)
         for what, arguments in told[keys.index(adapter.key) :]:

@@ -375,8 +375,8 @@ class Log:
     def keep_adapter(self, adapter: base.Adapter) -> None:
         """Keep what an adapter knows, for programs to come; called within `exclusive`."""
 
-    def kept_adapter(self) -> tuple[str, base.State] | None:
-        """Key and state of the adapter that was kept last."""
+    def kept_adapter(self) -> base.State | None:
+        """State of the adapter that was kept last."""
         return None
 
     def plan(self, trial: Trial) -> Frames:

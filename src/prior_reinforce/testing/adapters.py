@@ -90,7 +90,7 @@ class AdapterContract:
             return
         state.save(tmp_path / "state.npz")
         resumed = self.make()
-        resumed.resume(demonstrations, told.key, State.load(tmp_path / "state.npz"))
+        resumed.resume(demonstrations, State.load(tmp_path / "state.npz"))
         for trial in after:
             np.testing.assert_array_equal(resumed.propose(_goal(k)), told.propose(_goal(k)))
             for adapter in (told, resumed):

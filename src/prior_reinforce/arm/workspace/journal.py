@@ -266,7 +266,7 @@ class Journal(Log):
         """Write what an adapter knows."""
         self._store.save_adapter(adapter)
 
-    def kept_adapter(self) -> tuple[str, State] | None:
+    def kept_adapter(self) -> State | None:
         """Read what was kept of an adapter."""
         return self._store.adapter()
 

@@ -109,15 +109,13 @@ class Store:
         """Keep what an adapter knows, if it is one to which it takes long to be told."""
         state = adapter.state()
         if state is not None:
-            facts = {"key": adapter.key, "known": state.facts}
             with named_disk_errors(self._folder), in_place(self.path(_ADAPTER)) as unfinished:
-                State(facts, state.arrays).save(unfinished)
+                state.save(unfinished)
 
-    def adapter(self) -> tuple[str, State] | None:
-        """Key and state of the adapter that was kept last; None where none can be read."""
-        with suppress(FileFormatError, KeyError):
-            state = State.load(self.path(_ADAPTER))
-            return state.facts["key"], State(state.facts["known"], state.arrays)
+    def adapter(self) -> State | None:
+        """State of the adapter that was kept last; None where none can be read."""
+        with suppress(FileFormatError):
+            return State.load(self.path(_ADAPTER))
         return None
 
     def save_plan(self, plan: Plan, number: int, named: Collection[str] = ()) -> PlanFile:
