@@ -118,7 +118,7 @@ class Ask(OnWorkspace):
             now.state.executions.get(trial.number),
         )
         return AskView(
-            trial=trial_view(now, workspace.store, trial),
+            trial=trial_view(now, trial),
             first_pose=dict(zip(form.names, plan.actions[0].tolist(), strict=True)),
             gate=verdict.as_json() if verdict is not None else None,
             written=None if out is None else str(out),

@@ -78,7 +78,7 @@ def state_of(workspace: Workspace) -> State:
     if now.state.demonstrations is not None:
         shown = workspace.demonstrations.outcomes_seen
     return State(
-        **structs.asdict(status_view(now, workspace.store)),
+        **structs.asdict(status_view(now)),
         id=entries[-1].id if entries else 0,
         stopped=str(last_stop(workspace.folder)),
         components=components_of(workspace.manifest),

@@ -16,7 +16,6 @@ from prior_reinforce.arm.robots.report import LimitLine, LimitReport
 from prior_reinforce.arm.workspace.events import Moved, Moving
 from prior_reinforce.arm.workspace.reaching import reach_picture
 from prior_reinforce.arm.workspace.state import Standing, WorkspaceState
-from prior_reinforce.arm.workspace.store import Store
 from prior_reinforce.arm.workspace.view import TrialView, trial_view
 from prior_reinforce.errors import FileFormatError, WorkspaceError
 from prior_reinforce.files import claim_folder, named_disk_errors
@@ -34,7 +33,6 @@ _EXECUTED = ("executing", "executed")
 def report_workspace(
     now: Standing,
     entries: Sequence[Entry],
-    store: Store,
     folder: Path,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
@@ -49,8 +47,8 @@ def report_workspace(
         raise WorkspaceError(
             f"there is no trial to report yet; run: prior-reinforce ask {now.folder}"
         )
-    shown = cache(store.demonstrations)
-    records = [_record(now, entries, store, goal, shown) for goal in goals]
+    shown = cache(now.store.demonstrations)
+    records = [_record(now, entries, goal, shown) for goal in goals]
     robot, training = manifest.robot, state.training
     models = (trial.model for goal in goals for trial in state.trials_of(goal.number))
     dates = [entry.time[:10] for entry in entries if entry.kind in ("asked", "told")]
@@ -100,7 +98,6 @@ def _used_earlier(state: WorkspaceState, goal: Goal) -> bool:
 def _record(
     now: Standing,
     entries: Sequence[Entry],
-    store: Store,
     goal: Goal,
     shown: Callable[[str], Demonstrations],
 ) -> AdaptationRecord:
@@ -108,13 +105,13 @@ def _record(
     remarks: list[str] = []
     for trial in now.state.trials_of(goal.number):
         try:
-            plan = store.plan(now.state.plan_files[trial.number]).actions
+            plan = now.store.plan(now.state.plan_files[trial.number]).actions
         except FileFormatError as error:
             remarks.append(f"the plan of trial {trial.number} is not drawn: {error}")
         else:
             trial = replace(trial, plan=plan)
         trials.append(trial)
-    views = [trial_view(now, store, trial) for trial in trials]
+    views = [trial_view(now, trial) for trial in trials]
     training = now.state.trainings[trials[-1].model]
     return AdaptationRecord(
         demonstrations=shown(training.demonstrations_sha256),
@@ -126,7 +123,7 @@ def _record(
         warnings={view.number: view.warning for view in views if view.told and view.warning},
         checks=_checks(trials),
         notes=tuple(_notes(now.state, entries, goal, views)),
-        measured=_measured(now, entries, store, views, remarks),
+        measured=_measured(now, entries, views, remarks),
         photographs=tuple(_photographs(now.folder, trials)),
         film_caption="; ".join(remarks),
     )
@@ -163,7 +160,6 @@ def _notes(
 def _measured(
     now: Standing,
     entries: Sequence[Entry],
-    store: Store,
     views: Sequence[TrialView],
     remarks: list[str],
 ) -> dict[int, tuple[Any, Any]]:
@@ -171,13 +167,12 @@ def _measured(
     numbers, found = {view.number for view in views}, dict[int, tuple[Any, Any]]()
     for entry in entries:
         match entry.event:
-            case Moving(trial=number, motion="trial", folder=folder) if number in numbers:
+            case Moving(trial=n, motion="trial", folder=folder) if folder and n in numbers:
                 try:
-                    path = folder and read_path(store.execution_folder(folder), now.manifest.format)
-                    if path:
-                        found[number] = path
+                    if path := read_path(now.store.execution_folder(folder), now.manifest.format):
+                        found[n] = path
                 except FileFormatError as error:
-                    remarks.append(f"the path of trial {number} is not drawn: {error}")
+                    remarks.append(f"the path of trial {n} is not drawn: {error}")
     return found
 
 

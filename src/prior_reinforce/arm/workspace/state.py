@@ -25,6 +25,7 @@ from prior_reinforce.arm.workspace.events import (
     PlanAsked,
 )
 from prior_reinforce.arm.workspace.manifest import Manifest
+from prior_reinforce.arm.workspace.store import Store
 from prior_reinforce.errors import WorkspaceError
 from prior_reinforce.session.events import Event, GoalSet
 from prior_reinforce.session.trials import State, Trial
@@ -123,6 +124,11 @@ class Standing:
     folder: Path
     manifest: Manifest
     state: WorkspaceState
+
+    @cached_property
+    def store(self) -> Store:
+        """The files that events name."""
+        return Store(self.folder)
 
     @cached_property
     def moving(self) -> bool:

@@ -16,7 +16,6 @@ from msgspec import Struct, structs
 
 from prior_reinforce.arm.workspace.manifest import UNKNOWN
 from prior_reinforce.arm.workspace.state import Standing, Step
-from prior_reinforce.arm.workspace.store import Store
 from prior_reinforce.arm.workspace.text import goal_step, next_step, say_trial, say_warning
 from prior_reinforce.files import as_cell
 from prior_reinforce.formats import OutcomeFormat
@@ -217,11 +216,11 @@ class AdviceView(View, frozen=True):
     picture: str | None
 
 
-def trial_view(now: Standing, store: Store, trial: Trial) -> TrialView:
+def trial_view(now: Standing, trial: Trial) -> TrialView:
     """Return a trial as plain data."""
     reading, seen, outcome = trial.reading, None, None
     p_hit, to_go = trial.expected.p_hit, trial.expected.trials
-    file = store.plan_file(now.state.plan_files[trial.number])
+    file = now.store.plan_file(now.state.plan_files[trial.number])
     if reading is not None:
         seen = say_reading(reading, now.manifest.outcome_format)
     if reading is not None and reading.has_number:
@@ -253,7 +252,7 @@ def trial_view(now: Standing, store: Store, trial: Trial) -> TrialView:
     )
 
 
-def status_view(now: Standing, store: Store) -> StatusView:
+def status_view(now: Standing) -> StatusView:
     """Return where a workspace stands.
 
     Raises:
@@ -261,10 +260,10 @@ def status_view(now: Standing, store: Store) -> StatusView:
     """
     state, manifest, outcomes = now.state, now.manifest, now.manifest.outcome_format
     training, form, imported = state.training, manifest.format, state.demonstrations
-    trials = [trial_view(now, store, trial) for trial in state.trials]
+    trials = [trial_view(now, trial) for trial in state.trials]
     nearer = None
     if imported is not None and now.step == "ask" and not state.current:
-        shown = store.demonstrations(imported.sha256)
+        shown = now.store.demonstrations(imported.sha256)
         far = np.any(shown.far_outside(state.goals[-1].goal))
         nearer = f"a goal nearer to the demonstrations: {goal_step(now)}" if far else None
     view = StatusView(

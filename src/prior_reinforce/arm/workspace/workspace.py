@@ -261,7 +261,7 @@ class Workspace:
 
     def status(self) -> StatusView:
         """Where the workspace stands, as `prior-reinforce status --json`; printed, in ten lines."""
-        return status_view(self.standing, self.store)
+        return status_view(self.standing)
 
     def report(
         self,
@@ -281,7 +281,7 @@ class Workspace:
         from prior_reinforce.arm.workspace.report import report_workspace
 
         out = Path(folder or self.folder / "report")
-        return report_workspace(self.standing, self.events, self.store, out, progress)
+        return report_workspace(self.standing, self.events, out, progress)
 
     def import_recordings(
         self,
