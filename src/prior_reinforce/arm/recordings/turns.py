@@ -170,12 +170,13 @@ def _align(
         for i, (name, unit, kind) in enumerate(of_kind)
         if unit in TURN and name not in attitudes and kind is not Kind.TOOL
     }
-    upwards = all(motion[:, [*turning]].min() >= 0 for motion in motions if turning)
+    is_arm = len(turning) >= _JOINTS
+    upwards = is_arm and all(np.all(motion[:, [*turning]] >= 0) for motion in motions)
     for i, known in turning.items():
         said += together.take_turns(i, _range(form.names[i], limits), known=known, fixed=fixed)
     starts = {i: min(motion[0, i] for motion in motions) for i in turning}
     high = [i for i, start in starts.items() if start > TURN[form.units[i]] / 2]
-    if upwards and high and len(turning) >= _JOINTS:
+    if upwards and high:
         each = ", ".join(f"{form.names[i]} {starts[i]:.3g} {form.units[i]}" for i in high)
         what = f"{each} may be a turn too high for the arm's controller"
         said.append(f"no joint goes below 0, as where angles count from 0 to 360 deg: {what}")
