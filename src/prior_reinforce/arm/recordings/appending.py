@@ -11,13 +11,12 @@ from jaxtyping import Float
 
 from prior_reinforce.arm.recordings.preprocessing import copies
 from prior_reinforce.arm.recordings.selection import Selection
-from prior_reinforce.arm.recordings.takes import so_far
+from prior_reinforce.arm.recordings.takes import APART, so_far
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.motions import Demonstrations
 
-_FACTORS: Mapping[str, tuple[float, ...]] = {"rad": (180 / np.pi,), "m": (10.0, 100.0, 1000.0)}
-"""How many times too large or small a channel is in another unit, by its own: degrees, cm, mm."""
-_ANY_FACTORS = (10.0, 100.0, 1000.0)
+_FACTORS = (10.0, 100.0, 1000.0)
+"""How many times too large or small a channel is in another unit, where it is no angle: cm, mm."""
 _FITS = 0.3
 """Share of the largest number by which starts and ends may differ once brought to one unit. Ours:
 demonstrations of one task start alike, and end about as far."""
@@ -98,13 +97,13 @@ def _check_numbers(before: Demonstrations, motions: Sequence[Float[np.ndarray, "
         stands = max(np.ptp(ours), np.ptp(theirs)) < _STANDS * largest  # somewhere in each
         if unit == "1" or least == 0 or stands:
             continue
-        for factor in _FACTORS.get(unit, _ANY_FACTORS):
+        for factor in APART[unit] if unit == "rad" else _FACTORS:
             for larger, smaller in ((theirs, ours), (ours, theirs)):
                 fits = np.abs(larger - factor * smaller).max() < _FITS * largest
                 # Many times the way may be a longer way; where it starts as well it is a unit.
                 starts = np.abs(larger[0]) > _FITS * largest
                 enough = _LEAST.get(unit, 0.0) * (_STARTS if starts else 1)
-                if fits and largest > enough and (starts or factor > _ANY_FACTORS[0]):
+                if fits and largest > enough and (starts or factor > _FACTORS[0]):
                     raise InvalidDemonstrationsError(
                         f"{name} goes from {theirs[0]:.4g} to {theirs[1]:.4g} {unit} in the new "
                         f"demonstrations, and from {ours[0]:.4g} to {ours[1]:.4g} in those so far, "

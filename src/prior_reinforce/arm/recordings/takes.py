@@ -29,7 +29,7 @@ from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsErro
 from prior_reinforce.plans.whole_turns import TURN
 from prior_reinforce.units import base_of, factor, spelt, without_number
 
-_APART: Mapping[str, Sequence[float]] = {"rad": (TURN["deg"] / TURN["rad"],), "m": (100.0, 1000.0)}
+APART: Mapping[str, Sequence[float]] = {"rad": (TURN["deg"] / TURN["rad"],), "m": (100.0, 1000.0)}
 """How many times larger numbers get by the next unit: rad to deg, m to cm and mm."""
 _ALIKE = 1.5
 """How many times takes of one task may differ. Ours."""
@@ -118,7 +118,7 @@ def odd_takes(beliefs: Sequence[Belief]) -> tuple[set[str], list[Ambiguity]]:
     """
     groups: list[tuple[str, list[Belief]]] = [
         (unit, [b for b in beliefs if b.kind is not Kind.TOOL and base_of(b.unit)[0] == unit])
-        for unit in _APART
+        for unit in APART
     ]
     groups += [("", [one]) for one in beliefs if one.kind is Kind.TOOL]
     found: dict[tuple[str, ...], list[str]] = {}
@@ -160,7 +160,7 @@ def apart_from_most(reach: Mapping[str, float], unit: str) -> tuple[str, ...]:
             continue
         apart = max(number / middle, middle / number)
         looks, usual = (judge_unit(unit, n) if unit else str(n <= 1) for n in (number, middle))
-        between = any(f / _ALIKE <= apart <= f * _ALIKE for f in _APART.get(unit, ()))
+        between = any(f / _ALIKE <= apart <= f * _ALIKE for f in APART.get(unit, ()))
         if between or (looks != usual and apart >= _FAR_APART):
             odd.append(take)
     return tuple(odd)
