@@ -354,7 +354,16 @@ def test_limits_that_were_narrowed_while_the_program_waited_are_the_ones_that_co
 
 
 @pytest.mark.parametrize(
-    "name", ["journal.sqlite", "models", "plans", "demonstrations.png", "report", "workspace.toml"]
+    "name",
+    [
+        "journal.sqlite",
+        "models",
+        "plans",
+        "pictures",
+        "demonstrations.png",
+        "report",
+        "workspace.toml",
+    ],
 )
 def test_links_out_of_the_folder_are_refused_before_anything_is_read_or_written(
     workspace, tmp_path, name

@@ -10,10 +10,8 @@ from prior_reinforce.arm.workspace.manifest import MANIFEST_FILE, parse_manifest
 from prior_reinforce.errors import WorkspaceError
 from prior_reinforce.files import named_disk_errors, require_inside, sweep, write
 
-_OWN = (
-    *(MANIFEST_FILE, JOURNAL_FILE, "demonstrations", "models", "plans", "executions", "report"),
-    *("demonstrations.png", "outcomes.csv"),
-)
+_FOLDERS = ("demonstrations", "models", "plans", "executions", "pictures", "report")
+_OWN = (MANIFEST_FILE, JOURNAL_FILE, *_FOLDERS, "demonstrations.png", "outcomes.csv")
 """What is read and written in the folder."""
 
 
