@@ -102,19 +102,16 @@ class InUse:
             getattr(adapter, what)(*arguments)
         return adapter
 
-    def expected(self, state: State, condition: Point) -> Expectation:
+    def _expected(self, state: State, condition: Point) -> Expectation:
         """What the adapter expects of the next trial."""
         goal = latest_goal(state)
         return self.adapter.expect(condition, goal.goal, goal.tolerance)
 
-    def asked(
+    def _asked(
         self, state: State, condition: Point, verdict: Verdict | None, limited: str = ""
     ) -> Asked:
-        """The event of the next trial, with what the adapter expects of it.
-
-        `limited` says by what limits it falls short of what the adapter asked for.
-        """
-        expected = self.expected(state, condition)
+        """The event of the next trial; `limited` says why it falls short of what was wanted."""
+        expected = self._expected(state, condition)
         remarks = filter(None, (limited, self._remark(state, expected)))
         beyond = bool(limited) or (expected.beyond and not expected.nearer)
         return Asked(
@@ -160,11 +157,8 @@ class InUse:
         wanted: Point,
         plan: Frames,
         verdict_on: Callable[[Frames, Point, str], Verdict | None],
-    ) -> tuple[Point, Frames, Any, str]:
-        """The condition and its plan; or the last that passes between the goal and that one.
-
-        Returns:
-            Condition, plan and verdict, and by what it falls short of what was wanted, if it does.
+    ) -> tuple[Asked, Frames, Any]:
+        """The next trial, its plan and verdict: as wanted, or the last that passes towards that.
 
         Raises:
             OutOfReachError: No plan may be moved to the goal, and this one was tried and missed.
@@ -182,7 +176,7 @@ class InUse:
         goal, generator = latest_goal(state).goal, self.generator
         nearer = f"demonstrate nearer to {say_place(goal, self.demonstrations.outcome_format)}"
         try:
-            verdict = verdict_on(plan, wanted, self.say_no_plan(state, wanted))
+            verdict = verdict_on(plan, wanted, self._say_no_plan(state, wanted))
         except RobotLimitError as error:
             if np.array_equal(wanted, goal) or refusal(generator, goal, check):
                 raise
@@ -193,19 +187,15 @@ class InUse:
             (plan,) = generator.generate(nearest[None])
             why = str(error.__cause__).split(". ")[0]
             limited = f"moved only as far as passes, which may not do ({why}); {nearer}"
-            return (
-                nearest,
-                plan,
-                verdict_on(plan, nearest, self.say_no_plan(state, nearest)),
-                limited,
-            )
+            verdict = verdict_on(plan, nearest, self._say_no_plan(state, nearest))
+            return self._asked(state, nearest, verdict, limited), plan, verdict
         if verdict is not None and (n := _missed(state, wanted)):
-            expected = self.expected(state, wanted)
+            expected = self._expected(state, wanted)
             if expected.beyond:
                 raise OutOfReachError(f"trial {n} made the same plan and missed: {expected.remark}")
-        return wanted, plan, verdict, ""
+        return self._asked(state, wanted, verdict), plan, verdict
 
-    def say_no_plan(self, state: State, condition: Point) -> str:
+    def _say_no_plan(self, state: State, condition: Point) -> str:
         """Say for which goal there is no plan, and whether it is simply too far."""
         goal = latest_goal(state).goal
         form = self.demonstrations.outcome_format

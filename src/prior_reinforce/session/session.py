@@ -369,8 +369,7 @@ class Session:
 
     def _open(self, state: State, parts: InUse, condition: Point, plan: Frames) -> Verdict | None:
         """Write a new trial down, if its plan may be executed."""
-        condition, plan, verdict, limited = parts.passing(state, condition, plan, self._verdict)
-        event = parts.asked(state, condition, verdict, limited)
+        event, plan, verdict = parts.passing(state, condition, plan, self._verdict)
         self.log.keep_adapter(parts.adapter)
         self.log.append_asked(event, plan, parts.demonstrations.format)
         return verdict

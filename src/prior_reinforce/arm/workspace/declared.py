@@ -51,8 +51,11 @@ class DeclaredSymmetry(Struct, frozen=True, forbid_unknown_fields=True):
         if self.turns:
             about = "base" if isinstance(self.object, str) else self.object
         joints: list[int] = []
-        if robot is not None and robot.chain is not None:
+        ranges: list[tuple[float, float]] = []
+        chain = None if robot is None else robot.chain
+        if robot is not None and chain is not None:
             joints = [*match_joints(form, robot).values()]
+            ranges = [*zip(robot.lower.tolist(), robot.upper.tolist(), strict=True)]
             if len(joints) < len(robot.joint_names):
                 raise ConfigurationError(
                     f"a symmetry needs all joints of {robot.robot} in the plan, which has "
@@ -63,11 +66,9 @@ class DeclaredSymmetry(Struct, frozen=True, forbid_unknown_fields=True):
             k,
             about=about,
             distance="shift" if self.object == "anywhere" else self.distance,
-            chain=robot.chain if robot is not None and joints else None,
+            chain=chain,
             joints=joints,
-            ranges=[*zip(robot.lower.tolist(), robot.upper.tolist(), strict=True)]
-            if robot is not None and joints
-            else (),
+            ranges=ranges,
             start=self.start,
             release_frame=self.release_frame,
             steps=self.steps,
