@@ -14,6 +14,7 @@ changes add to a field, and concern one goal or all, is ours.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -29,7 +30,7 @@ _LEAST_ODDS = 1e-3
 """Histories less probable than this part of the most probable one are dropped (ours)."""
 _MOST = 6
 """Histories that are kept at most (ours)."""
-NOTHING = 0.1
+_NOTHING = 0.1
 """Probability that nothing has changed although it was said (ours)."""
 _WIDTH = 8.0
 """W of `expectation_propagation`: a trial that was told wrongly may be told anywhere in that."""
@@ -60,6 +61,13 @@ class Change:
         if self.shift_sd:
             return np.asarray(both * self.shift_sd**2)
         return np.asarray(both * prior.of_change(a.conditions, b.conditions))
+
+
+def announced(since: int, shift_sd: float) -> list[tuple[tuple[Change, ...], float]]:
+    """What may have changed where somebody says so, and the log probability of each."""
+    something = math.log(0.5 * (1.0 - _NOTHING))
+    changes = [((Change(since, sd),), something) for sd in (0.0, shift_sd)]
+    return [((), math.log(_NOTHING)), *changes]
 
 
 def changes_of(data: Any) -> tuple[Change, ...]:

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from prior_reinforce.adapters.base import Expectation, State
-from prior_reinforce.adapters.change_points import NOTHING, Change, History, changes_of, split, told
+from prior_reinforce.adapters.change_points import History, announced, changes_of, split, told
 from prior_reinforce.adapters.displacement import BayesianConfig, DisplacementPrior
 from prior_reinforce.adapters.expectation_propagation import Posterior, Readings, infer
 from prior_reinforce.adapters.memory import Memory, Places, tried_again, untried_around
@@ -136,14 +136,9 @@ class DisplacedTrials:
 
     def change_hardware(self) -> None:
         """Something may be different from now on; what is known of it stays as known."""
-        something = math.log(0.5 * (1.0 - NOTHING))
-        unchanged = [h.then(math.log(NOTHING)) for h in self._histories]
-        changed = [
-            h.then(something, Change(self._now, shift_sd))
-            for h in self._histories
-            for shift_sd in (0.0, self.config.shift_sd)
-        ]
-        self._histories = sorted(unchanged + changed, key=lambda h: -h.log_weight)
+        may_be = announced(self._now, self.config.shift_sd)
+        after = [h.then(log_p, *changes) for changes, log_p in may_be for h in self._histories]
+        self._histories = sorted(after, key=lambda h: -h.log_weight)
 
     def observe(self, condition: Point, goal: Point, reading: Reading) -> None:
         """Take in one trial; see `Adapter.observe`."""

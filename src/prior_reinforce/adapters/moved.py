@@ -34,7 +34,7 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.adapters.base import State
-from prior_reinforce.adapters.change_points import NOTHING, Change, changes_of
+from prior_reinforce.adapters.change_points import Change, announced, changes_of
 from prior_reinforce.adapters.expectation_propagation import Posterior, Readings, infer
 from prior_reinforce.adapters.memory import Memory, Places
 from prior_reinforce.adapters.moved_prior import NONE, Model, MovedPrior
@@ -170,14 +170,9 @@ class MovedBelief:
 
     def change(self, number: int) -> None:
         """Something was changed before that trial or, with a small probability, nothing."""
-        something = math.log(0.5 - 0.5 * NOTHING)
         self._branch(
             (h, changes, log_p)
-            for changes, log_p in (
-                ((), math.log(NOTHING)),
-                ((Change(number, 0.0),), something),
-                ((Change(number, 1.0),), something),
-            )
+            for changes, log_p in announced(number, 1.0)
             for h in range(len(self.hypotheses))
         )
 
