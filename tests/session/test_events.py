@@ -4,7 +4,9 @@ import msgspec
 import pytest
 
 from prior_reinforce.readings import Reading
-from prior_reinforce.session.events import Amended, Asked, SessionEvent, Told
+from prior_reinforce.session.events import Amended, Asked, GoalSet, Told, Voided
+
+SessionEvent = GoalSet | Asked | Told | Amended | Voided
 
 
 def test_an_event_is_an_object_that_names_its_kind():

@@ -83,9 +83,6 @@ class Voided(Event, frozen=True):
     reason: str
 
 
-SessionEvent = GoalSet | Asked | Told | Amended | Voided
-
-
 class Entry(msgspec.Struct, frozen=True):
     """An event in a log."""
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
 
-from prior_reinforce.adapters.base import Expectation, next_key
+from prior_reinforce.adapters.base import Adapter, Expectation, next_key
 from prior_reinforce.adapters.memory import AGAIN
 from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.errors import (
@@ -20,17 +20,13 @@ from prior_reinforce.errors import (
     WorkspaceError,
 )
 from prior_reinforce.formats import in_tolerances
+from prior_reinforce.generators.base import Generator
 from prior_reinforce.generators.reach import farthest_between, refusal
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.symmetry import Polar
 from prior_reinforce.session.events import Asked
 from prior_reinforce.session.trials import Goal, Log, State, Verdict
 from prior_reinforce.wording import say_place
-
-if TYPE_CHECKING:
-    from prior_reinforce.adapters.base import Adapter
-    from prior_reinforce.generators.base import Generator
-    from prior_reinforce.plans.motions import Demonstrations
-
 
 _RIVAL = "rival"
 """Name of the model that is learned about the rival of the declared axis."""
@@ -252,9 +248,6 @@ def latest_goal(state: State) -> Goal:
 
 def _loaded(given: Any) -> Any:
     """What was given, or what the loader that was given returns; a network is callable too."""
-    from prior_reinforce.adapters.base import Adapter
-    from prior_reinforce.generators.base import Generator
-
     return given() if callable(given) and not isinstance(given, (Generator, Adapter)) else given
 
 

@@ -18,23 +18,21 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from threading import RLock
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from prior_reinforce.adapters.base import Adapter
 from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.errors import ConfigurationError, RobotLimitError, TrialStateError
+from prior_reinforce.generators.base import Generator
 from prior_reinforce.parsing import as_place, as_reading
+from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.events import Amended, GoalSet, Told, Voided
 from prior_reinforce.session.in_use import InUse, generated, latest_goal
 from prior_reinforce.session.trials import Goal, Log, Stage, State, Trial, Verdict
-
-if TYPE_CHECKING:
-    from prior_reinforce.adapters.base import Adapter
-    from prior_reinforce.generators.base import Generator
-    from prior_reinforce.plans.motions import Demonstrations
 
 
 class Session:

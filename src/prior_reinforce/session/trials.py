@@ -11,11 +11,11 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from numbers import Integral
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
-from prior_reinforce.adapters.base import Expectation
+from prior_reinforce.adapters import base
 from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.errors import (
     InvalidFeedbackError,
@@ -27,9 +27,6 @@ from prior_reinforce.formats import OutcomeFormat, in_tolerances
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.events import Amended, Asked, Entry, Event, GoalSet, Told, Voided
-
-if TYPE_CHECKING:
-    from prior_reinforce.adapters import base
 
 
 class Verdict(Protocol):
@@ -111,7 +108,7 @@ class Trial:
     """Whether it is voided, and was told until then: a person may have meant another trial."""
     outdated: bool = False
     """Whether a reading that it was planned from was amended or voided while it waited."""
-    expected: Expectation = field(default_factory=Expectation)
+    expected: base.Expectation = field(default_factory=base.Expectation)
     """What its adapter expected of it; `beyond` also where the gate lets no plan so far."""
     model: str = ""
     """Which model planned it: the name of its folder in a workspace, else empty."""
