@@ -63,7 +63,7 @@ def test_a_perception_without_pictures_stays_as_it_is(tmp_path):
 def test_what_a_report_tells_says_why_there_is_no_film(tmp_path, monkeypatch):
     task = make_task("basketball-v1")
     demonstrations = task.demonstrations("A")
-    generator = make_generator("nearest").fit(demonstrations, seed=0)
+    generator = make_generator("interpolation,timing=none").fit(demonstrations, seed=0)
     (result,) = run_goals(
         task,
         generator,

@@ -7,10 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
-from prior_reinforce.adapters.base import Adapter, State, next_key
+from prior_reinforce.adapters.base import Adapter, Expectation, State, next_key
 from prior_reinforce.arrays import Point
 from prior_reinforce.errors import InvalidFeedbackError, InvalidGoalError, NotFittedError
 from prior_reinforce.readings import Reading
@@ -62,6 +63,13 @@ class AdapterContract:
         for trial in _trials(k):
             clean.observe(*trial)
         assert np.array_equal(clean.propose(goal), value), "observe copies what it keeps"
+
+    @each_k
+    def test_what_is_expected_can_be_written_down(self, k: int) -> None:
+        adapter, goal = self._started(k), _goal(k)
+        expected = adapter.expect(adapter.propose(goal), goal, np.full(k, 0.05))
+        again = msgspec.json.decode(msgspec.json.encode(expected), type=Expectation)
+        assert again == expected, "expect returns an Expectation of plain numbers"
 
     @each_k
     def test_starting_again_forgets_every_trial(self, k: int) -> None:
