@@ -163,3 +163,8 @@ def test_a_channel_is_of_the_joint_whose_whole_name_it_has():
     there = ("Wrist_Pitch.pos", "Pitch.pos")
     assert find_channels(("Pitch", "Wrist_Pitch"), there) == [1, 0]
     assert find_channels(("Pitch",), there) == [1]
+
+
+def test_two_columns_of_one_name_are_not_chosen_from():
+    with pytest.raises(InvalidDemonstrationsError, match="joint1; rename"):
+        find_channels(["joint1", "joint2"], ["joint0", "joint1", "joint1", "joint2"])

@@ -145,6 +145,8 @@ def _numbers_its_names(said: Mapping[Any, Any]) -> bool:
 def _find(name: str, there: Sequence[str], wanted: Sequence[str]) -> int | None:
     bare = split_unit(name, CHANNEL_UNITS)[0]
     for exact in (name, bare):
+        if list(there).count(exact) > 1:
+            raise InvalidDemonstrationsError(f"several columns are called {exact}; rename them")
         if exact in there:
             return there.index(exact)
     names = [_OF_POSITIONS.sub("", split_unit(channel, CHANNEL_UNITS)[0]) for channel in there]
