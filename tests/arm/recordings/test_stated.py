@@ -81,7 +81,15 @@ def test_frames_beyond_the_number_that_move_are_no_padding():
         frames_said("a", "q", {"q": Q, "length": np.int64(40)}, 101)
 
 
-@pytest.mark.parametrize(("name", "keys"), [("joint_angles", ("joint_angles",)), ("dq", None)])
+@pytest.mark.parametrize(
+    ("name", "keys"),
+    [
+        ("joint_angles", ("joint_angles",)),
+        ("dq", None),
+        ("obs/outcomes", None),
+        ("landing", None),
+    ],
+)
 def test_the_only_array_that_may_be_the_motion_is_it(name, keys):
     shapes = {name: np.zeros((20, 6)), "t": np.zeros(20)}
     if keys is None:

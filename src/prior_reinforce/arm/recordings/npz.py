@@ -75,8 +75,7 @@ def _each(path: Path, arrays: Arrays, options: ReadOptions) -> Episodes:
 
 
 def _episodes(path: Path, arrays: Arrays, name: str, options: ReadOptions) -> Episodes:
-    movable = {name: own for name, own in arrays.items() if name not in _OUTCOME_KEYS}
-    keys = motion_keys(path, options, movable, _MOTION_KEYS, most=3)
+    keys = motion_keys(path, options, arrays, _MOTION_KEYS, most=3)
     motions = arrays[keys[0]]
     outcomes = next((arrays[name] for name in _OUTCOME_KEYS if name in arrays), None)
     episodes, several = [name], motions.ndim == 3

@@ -46,6 +46,8 @@ _NAMES = re.compile(r"name|joint|dof|motor|actuator|channel|column|label|ax[ei]s
 _FRAMES = re.compile(
     r"lengths?|(n|num)_?(frames|steps|samples)|(episode|traj|trajectory|sequence)_(len|lengths?)"
 )
+_OUTCOME = re.compile(r"(.*[^a-z])?(outcomes?|landings?|landed)([^a-z].*)?", re.IGNORECASE)
+"""What an array of where objects landed is called."""
 _UNIT = re.compile(r"((joint|angle|angular|position|motion|rotation)s?_?)?units?", re.IGNORECASE)
 """What the joints' units are called among others, deep in what a file says of itself."""
 _MOST_SAID = 1_000_000
@@ -68,7 +70,9 @@ def motion_keys(
     """
     shapes = {name: own.shape for name, own in arrays.items() if own.dtype.kind in "fiu"}
     single = [name for name, shape in shapes.items() if len(shape) == 1]
-    there = sorted(name for name, shape in shapes.items() if 2 <= len(shape) <= most)
+    there = sorted(
+        n for n, s in shapes.items() if 2 <= len(s) <= most and not _OUTCOME.fullmatch(n)
+    )
     keys = options.key or tuple(name for name in usual if name in shapes)[:1]
     keys = keys or tuple(single[i] for i in find_channels(options.joints or (), single) or ())
     keys = keys or tuple(there if len(there) == 1 and not says_no_position(there[0]) else ())
