@@ -335,3 +335,20 @@ def test_packed_numbers_are_unpacked(tmp_path):
         file["q"].attrs["scale_factor"] = 1e-4  # applied already, or not?
     with pytest.raises(FileFormatError, match=r"q \(float64\) says scale_factor = 0\.0001"):
         read_recordings(tmp_path, key="q")
+
+
+def test_fields_of_records_are_read_as_arrays_are(tmp_path):
+    t, q = sampled(0, 50)
+    fields = [("t", float), *((name, float) for name in JOINTS)]
+    records = np.rec.fromarrays([t, *np.rad2deg(q).T], dtype=fields)
+    with h5py.File(tmp_path / "all.h5", "w") as file:
+        file["data/demo_0/log"] = records
+        file["data/demo_0/log"].attrs["units"] = "deg"
+    (read,) = read_recordings(tmp_path, joints=JOINTS)
+    np.testing.assert_allclose(read.positions, np.rad2deg(q))
+    np.testing.assert_allclose(read.times, t)
+    assert read.units == ("deg",) * len(JOINTS)
+    with h5py.File(tmp_path / "all.h5", "a") as file:
+        file["data/demo_0/other"] = records
+    (read,) = read_recordings(tmp_path, key=tuple(f"log.{name}" for name in JOINTS), rate=50)
+    np.testing.assert_allclose(read.positions, np.rad2deg(q))

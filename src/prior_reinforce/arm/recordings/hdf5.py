@@ -28,7 +28,7 @@ from prior_reinforce.arm.recordings.recording import (
     named_damage,
     natural_order,
 )
-from prior_reinforce.arm.recordings.stated import motion_keys, recorded_among
+from prior_reinforce.arm.recordings.stated import by_field, motion_keys, recorded_among
 from prior_reinforce.arm.recordings.time_finder import Stamps
 from prior_reinforce.errors import FileFormatError
 
@@ -65,7 +65,9 @@ def read(source: Path, options: ReadOptions) -> Episodes:
 def _demo(path: Path, top: Any, within: str, options: ReadOptions, episode: str) -> Recording:
     with named_damage(path, "HDF5"):
         group = _own(path, top, within)
-        found = _arrays_in(path, group, options.key or _KEYS)
+        raw = _arrays_in(path, group, options.key or _KEYS)
+        read = {n: _numbers(path, n, own) if own.dtype.names else own for n, own in raw.items()}
+        found = by_field(read)
         keys = motion_keys(f"{path}: {group.name}", options, found, _KEYS)
         numbers = {name: own for name, own in found.items() if own.dtype.kind in "biuf"}
         shapes = {name: own.shape for name, own in numbers.items() if own.shape}
@@ -81,7 +83,8 @@ def _demo(path: Path, top: Any, within: str, options: ReadOptions, episode: str)
                 and (math.prod(own) == count or may_move(name, math.prod(own[1:])))
             )
         }
-        texts, stated = _said(path, top, group, key)
+        of_record = (n for n in raw if key.removeprefix(f"{n}.") in (raw[n].dtype.names or ()))
+        texts, stated = _said(top, group, raw[key if key in raw else next(of_record)])
         declared = int(stated.get("num_samples", count))
     if declared > count:
         raise FileFormatError(
@@ -92,7 +95,7 @@ def _demo(path: Path, top: Any, within: str, options: ReadOptions, episode: str)
 
 
 def _said(
-    path: Path, top: Any, group: Any, key: str
+    top: Any, group: Any, own: Any
 ) -> tuple[dict[str, tuple[str, ...]], dict[str, np.ndarray]]:
     """Texts and numbers that attributes hold, and arrays of texts, the nearest to the motion first.
 
@@ -100,7 +103,6 @@ def _said(
     """
     texts: dict[str, tuple[str, ...]] = {}
     stated: dict[str, np.ndarray] = {}
-    own = _own(path, group, key)
     for node in dict.fromkeys((own, own.parent, group, top, top.file)):
         found = {name: (node.attrs.get_id, node.attrs) for name in node.attrs}
         if node != own and len(node) <= _MOST_BESIDE:
@@ -150,6 +152,8 @@ def _arrays_in(path: Path, group: Any, keys: Sequence[str]) -> dict[str, Any]:
 
 def _numbers(path: Path, name: str, found: Any) -> Stamps:
     """The numbers of an array, unpacked, unless its header claims more than a recording has."""
+    if isinstance(found, np.ndarray):  # a field of a record, which was read whole
+        return found
     for what, shape in ((name, found.shape), (f"a chunk of {name}", found.chunks or ())):
         check_numbers(path, what, shape, found.dtype.itemsize)
     numbers = np.asarray(found[()])

@@ -29,7 +29,7 @@ from prior_reinforce.arm.recordings.recording import (
     natural_order,
     unread,
 )
-from prior_reinforce.arm.recordings.stated import motion_keys, recorded_among
+from prior_reinforce.arm.recordings.stated import by_field, motion_keys, recorded_among
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import open_npz
 
@@ -123,7 +123,7 @@ def _arrays(path: Path) -> Arrays:
     if path.suffix.lower() == ".npy":
         check_bytes(path, path.stat().st_size)
         with named_damage(path, "NPY with plain numbers"), path.open("rb") as file:
-            return _by_field({_MOTION_KEYS[0]: np.load(file, allow_pickle=False)})
+            return by_field({_MOTION_KEYS[0]: np.load(file, allow_pickle=False)})
     remedy = "it must be an NPZ with plain number arrays; copy it again, or say its format"
     with open_npz(path, remedy, MOST_BYTES) as archive:
         content = {name: np.asarray(archive[name]) for name in archive.files}
@@ -136,12 +136,4 @@ def _arrays(path: Path) -> Arrays:
             content.setdefault("dt", np.array(float(form["dt"])))
             content.setdefault("names", np.array(form.get("names") or form.get("joint_names")))
             del content["metadata"]
-        return _by_field(content)
-
-
-def _by_field(arrays: Arrays) -> dict[str, np.ndarray]:
-    """Arrays with each field of a record by itself, by the field's name."""
-    fields = [(name, field) for name, own in arrays.items() for field in own.dtype.names or ()]
-    twice = len({field for _, field in fields} | arrays.keys()) < len(fields) + len(arrays)
-    plain = {name: own for name, own in arrays.items() if not own.dtype.names}
-    return plain | {f"{n}.{f}" if twice else f: arrays[n][f] for n, f in fields}
+        return by_field(content)

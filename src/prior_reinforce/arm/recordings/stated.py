@@ -54,6 +54,14 @@ _MOST_SAID = 1_000_000
 """Bytes of a JSON beside a table at most. Ours: it says what the columns are."""
 
 
+def by_field(arrays: Mapping[str, Any]) -> dict[str, Any]:
+    """Return arrays with each field of a record by itself, by the field's name."""
+    fields = [(name, field) for name, own in arrays.items() for field in own.dtype.names or ()]
+    twice = len({field for _, field in fields} | arrays.keys()) < len(fields) + len(arrays)
+    plain = {name: own for name, own in arrays.items() if not own.dtype.names}
+    return plain | {f"{n}.{f}" if twice else f: arrays[n][f] for n, f in fields}
+
+
 def motion_keys(
     where: object,
     options: ReadOptions,
