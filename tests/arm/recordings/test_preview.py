@@ -32,6 +32,7 @@ def test_the_text(folder):
     assert rows["episodes"].startswith(f"6 from {folder.name} (npz): throw_0, throw_1")
     assert rows["rate"] == "recorded at 100 Hz (t in s), plans at 100 Hz (dt 0.01 s)"
     assert rows["still ends"].startswith("dropped 0.2")
+    assert "--no-trim" in rows["still ends"]
     assert "5 hold their last pose" in rows["length"]
     # Joint 6 of the largest throw: 0.9 * 1.25 rad; the fastest is 0.9 * 1.15 * 15/8 in 1.0 s.
     assert "joint6 moves most, over 1.12 rad" in rows["motion"]

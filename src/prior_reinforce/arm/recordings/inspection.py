@@ -150,9 +150,8 @@ class Inspection:
         clocks = " and ".join(dict.fromkeys(r.clock for r in self.recordings if r.clock))
         recorded = _span((1 / recording.period for recording in self.recordings), ".4g")
         before, after = done.starts, self._cut_after
-        cut = (
-            f"dropped {_span(before, '.2f')} s before and {_span(after, '.2f')} s after the motion"
-        )
+        cut = f"dropped {_span(before, '.2f')} s before and {_span(after, '.2f')} s after the "
+        cut += "motion (--no-trim keeps them)"
         horizon = done.plans.shape[1]
         lengths = [end - start for start, end in zip(done.starts, done.ends, strict=True)]
         groups: dict[str, list[str]] = {}

@@ -338,7 +338,7 @@ def _moving_span(
     if rows is None:
         raise InvalidDemonstrationsError(
             f"episode {recording.episode} never moves by more than {signals.trim_band.max():.2g} "
-            "from its first pose; leave it out, or import without trimming"
+            "from its first pose; leave it out, or import without trimming (--no-trim)"
         )
     # The last frame within the still band before the motion, and the first one after it.
     before, after = rows[0] - 1, min(rows[1] + 1, len(t) - 1)
