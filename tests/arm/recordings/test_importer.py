@@ -340,6 +340,19 @@ def test_ways_back_between_throws_are_named_and_outcomes_are_taken_as_they_come(
     np.testing.assert_allclose(told.outcomes_seen, taken.outcomes_seen)
 
 
+def test_an_approach_in_every_file_is_cut_off_as_the_remark_says(tmp_path):
+    for i, end in enumerate(ENDS):
+        path = _day(tmp_path, [((0.4, 0.5), (0.1, 0.2)), ((0.1, 0.2), end)])
+        path.rename(tmp_path / f"{i}.csv")
+    approaches = tuple(f"{i}-0" for i in range(6))
+    (remark,) = import_demonstrations(tmp_path).preview.remarks
+    assert f"--rests 0.5 --leave-out {' '.join(approaches)} (" in remark
+    cut = import_demonstrations(tmp_path, rests=0.5, leave_out=approaches)
+    np.testing.assert_allclose(cut.demonstrations.plans[:, 0], [(0.1, 0.2)] * 6, atol=1e-3)
+    assert not cut.preview.remarks
+    assert not import_demonstrations(tmp_path, rests=0).preview.remarks
+
+
 def test_a_recorder_that_pauses_with_the_arm_is_cut_where_it_pauses(tmp_path):
     path = _day(tmp_path, [((0.1, 0.2), end) for end in ENDS], gap=8.0)
     text = "\n".join(  # without the rests before and after

@@ -11,6 +11,7 @@ from prior_reinforce.arm.recordings.takes import (
     all_return,
     doubts_of_times,
     odd_starts,
+    pauses,
     ways_back,
 )
 from prior_reinforce.arm.recordings.units import Ambiguity
@@ -168,3 +169,19 @@ def test_what_stands_still_may_stand_anywhere():
     noise = np.random.default_rng(0).normal(0, 1e-4, (6, 40))
     near = [np.column_stack([1.5 + 0.01 * (i % 2) + n, 10 + 75 * S]) for i, n in enumerate(noise)]
     assert said(near) == []
+
+
+@pytest.mark.parametrize(
+    ("rest", "size", "told"), [(0.6, 1.0, True), (0.6, 0.1, False), (0.1, 1.0, False)]
+)
+def test_an_approach_before_every_throw_is_named_with_what_cuts_it_off(rest, size, told):
+    """An approach, a rest in [s], and a throw, a small one of which may be a bump."""
+
+    def takes_of(rests):
+        courses = [np.concatenate([S - 1, np.zeros(round(50 * rest)), size * S]) for rest in rests]
+        swings = [course[:, None] * [0.3, 0.4, -0.2] for course in courses]
+        return [Recording(f"t{i}", np.arange(len(q)) / 50, q, ARM) for i, q in enumerate(swings)]
+
+    said = "".join(pauses(takes_of([rest] * 3)))
+    assert ("--rests 0.5 --leave-out t0-0 t1-0 t2-0" in said) == told
+    assert not [*pauses(takes_of([rest, rest, 0]))]

@@ -32,7 +32,7 @@ from prior_reinforce.arm.recordings.preprocessing import Preprocessing, at_rests
 from prior_reinforce.arm.recordings.preview import Preview
 from prior_reinforce.arm.recordings.recording import Episodes, Recording, has_files, refuse_pointers
 from prior_reinforce.arm.recordings.selection import Selection, select
-from prior_reinforce.arm.recordings.takes import doubts_of_times, ways_back
+from prior_reinforce.arm.recordings.takes import doubts_of_times, pauses, several_throws, ways_back
 from prior_reinforce.arm.recordings.units import Ambiguity, listed, raise_if_ambiguous
 from prior_reinforce.arm.robots.gate_settings import GateSettings
 from prior_reinforce.arm.robots.limits import RobotLimits
@@ -43,10 +43,6 @@ from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.symmetry import Symmetry
 from prior_reinforce.wording import as_html
-
-_REST, _MOST_MOTIONS = 0.5, 3
-"""Rest in [s] after which another throw may begin, and motions of one throw: there and back, with a
-pause. Ours."""
 
 
 @dataclass(frozen=True)
@@ -226,12 +222,7 @@ class Recordings:
         unsaid = {"rests", "episodes", "leave_out"}.isdisjoint(self.options.given)
         if len(self.episodes) > 1 or not unsaid or by_option:
             return tuple(by_option.values())
-        count = len(at_rests(self.episodes[0], _REST))
-        what = (
-            f"{self.episodes[0].episode} holds {count} motions with rests of {_REST:g} s or more "
-            "between: it looks like several throws (if it is one: --rests 0)"
-        )
-        return (Ambiguity(what, f"--rests {_REST:g}"),) * (count > _MOST_MOTIONS)
+        return several_throws(self.episodes[0])
 
     @property
     def outcome_places(self) -> list[Path]:
@@ -251,7 +242,9 @@ class Recordings:
             joints = names = wanted.robot.joint_names  # asked about, since nothing names them
         units, shares = (self.options.units, wanted.plan_units), self.format == "lerobot"
         selection = select(self.episodes, joints, names, *units, normalised=shares)
-        return replace(selection, ambiguities=self.ambiguities + selection.ambiguities)
+        said = pauses(selection.recordings) if self.options.rests is None else ()
+        unclear = self.ambiguities + selection.ambiguities
+        return replace(selection, ambiguities=unclear, remarks=(*selection.remarks, *said))
 
     def outcomes(
         self,

@@ -16,6 +16,7 @@ from jaxtyping import Float
 
 from prior_reinforce.arm.recordings.channels import Kind
 from prior_reinforce.arm.recordings.judging import Belief
+from prior_reinforce.arm.recordings.preprocessing import at_rests
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.units import (
     Ambiguity,
@@ -26,6 +27,7 @@ from prior_reinforce.arm.recordings.units import (
 )
 from prior_reinforce.arrays import Plans
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
+from prior_reinforce.plans.speeds import largest_of_unit
 from prior_reinforce.plans.whole_turns import TURN
 from prior_reinforce.units import base_of, factor, spelt, without_number
 
@@ -45,6 +47,12 @@ _WITHIN = 0.2
 """Part of the gap between two groups by which starts within one may differ. Ours."""
 _BACK = 0.1
 """Part of its range that a joint may be off where a motion goes back to a start. Ours."""
+
+_REST, _MOST_MOTIONS = 0.5, 3
+"""Rest in [s] after which another throw may begin, and motions of one throw: there and back, with a
+pause. Ours."""
+_OWN = 0.2
+"""Part of the recording's largest range that a motion of its own has; ours: bumps have less."""
 
 
 def in_one_unit(
@@ -268,6 +276,35 @@ def all_return(plans: Plans) -> str:
     return (
         "every motion ends where it began: if it rests before it goes back, cut it there "
         "(--rests 0.3), and leave the way back out"
+    )
+
+
+def several_throws(recording: Recording) -> tuple[Ambiguity, ...]:
+    """Ask where the only recording holds so many motions that it may be several throws."""
+    count = len(at_rests(recording, _REST))
+    what = (
+        f"{recording.episode} holds {count} motions with rests of {_REST:g} s or more between: it "
+        "looks like several throws (if it is one: --rests 0)"
+    )
+    return (Ambiguity(what, f"--rests {_REST:g}"),) * (count > _MOST_MOTIONS)
+
+
+def pauses(recordings: Sequence[Recording]) -> Iterator[str]:
+    """Say it if every recording rests between motions, and does not end where it began.
+
+    An approach and a throw do so; of a way back, `all_return` tells.
+    """
+    others = list[str]()
+    for recording in recordings:
+        q, units = recording.positions, [unit or "rad" for unit in recording.units]
+        least, parts = _OWN * largest_of_unit(np.ptp(q, axis=0), units), at_rests(recording, _REST)
+        own = [p.episode for p in parts if np.any(np.ptp(p.positions, axis=0) > least)]
+        if len(own) < 2 or _is_at(q[-1], q[0], np.ptp(q, axis=0)):
+            return
+        others += [part.episode for part in parts if part.episode != own[-1]]
+    yield (
+        f"every recording rests for {_REST:g} s or more between motions: if the last alone is the "
+        f"throw, --rests {_REST:g} --leave-out {shlex.join(others)} (if all are: --rests 0)"
     )
 
 
