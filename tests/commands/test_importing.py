@@ -351,3 +351,11 @@ def test_inspecting_says_what_is_guessed_of_outcomes_and_an_import_what_was_said
     assert "it looks like cm (or inches: --outcome-unit in) (--outcome-unit cm)" in out
     out = run("import", folder, "some", "--outcome-unit", "cm")[1]
     assert "outcomes.csv, in cm as --outcome-unit says (or inches: --outcome-unit in)" in out
+
+
+def test_inspecting_says_from_which_table_outcomes_are(run, folder, tmp_path):
+    recordings(tmp_path / "some")
+    table = tmp_path / "some" / "outcomes.csv"
+    table.rename(table.with_name("results.csv"))
+    out = run("import", folder, "some", "--inspect", "--format", "npz")[1]
+    assert "outcomes: some/results.csv, none missing" in out

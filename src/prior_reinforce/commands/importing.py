@@ -175,14 +175,10 @@ class Import(OnWorkspace):
         table = self.outcomes or table_beside(places)
         known, unclear = self._known(wanted, recordings, selection, may_lack=True)
         found = replace(found, selection=replace(found.selection, ambiguities=unclear))
-        missing: list[str] = []
-        if table is not None:
-            missing = missing_outcomes(episodes, known)
-            said = f"{table}, {', '.join(missing) or 'none'} missing"
-        elif known.episodes:
-            said = "in the recordings"
-        else:
-            table, missing = places[0] / OUTCOMES_FILE, [*episodes]
+        missing = missing_outcomes(episodes, known)
+        said = f"{known.where}, {', '.join(missing) or 'none'} missing"
+        if table is None and not known.episodes:
+            table = places[0] / OUTCOMES_FILE
             rows: dict[str, tuple[object, ...]] = dict.fromkeys(episodes, ())
             names, units = wanted.outcome_names or (), wanted.outcome_units or ()
             with named_disk_errors(places[0]):
