@@ -476,3 +476,19 @@ def test_what_has_no_outcome_is_left_out_by_name_and_no_throw_that_has_one():
     outcomes = Outcomes.of_numbers("a table", {"1": (0.8, 0.1)})
     with pytest.raises(InvalidDemonstrationsError, match=r"--leave-out 0$"):
         outcomes_of(["0", "1"], outcomes, partial(ways_back, [there, back]))
+
+
+@pytest.mark.parametrize("name", ["results.csv", "outcomes (1).csv"])
+def test_a_second_table_that_says_other_outcomes_is_named(tmp_path, name):
+    folder = write_csv(tmp_path)
+    path, other = write_outcomes(folder), folder / name
+    other.write_text(path.read_text())
+    assert import_demonstrations(folder).demonstrations.n == len(OUTCOMES)  # a copy
+    other.write_text(path.read_text().replace("x,y", "score,tries"))
+    assert import_demonstrations(folder).demonstrations.n == len(OUTCOMES)  # of something else
+    other.write_text(path.read_text().replace("0.8,", "0.9,"))
+    with pytest.raises(UnclearUnitsError) as asked:
+        import_demonstrations(folder)
+    assert str(other) in str(asked.value)
+    assert f"--outcomes {path}" in str(asked.value)
+    assert import_demonstrations(folder, outcomes=path).demonstrations.outcomes_seen[0, 0] == 0.8

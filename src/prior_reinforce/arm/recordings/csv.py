@@ -116,20 +116,13 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             yield episode, partial(_episode, own, episode, options, column, guessed, said, remarks)
 
 
-def table_of_outcomes(
-    source: Path, there: Sequence[str]
-) -> tuple[Path | None, tuple[Ambiguity, ...]]:
-    """Return the file among recordings that looks like their table of outcomes, and this doubt."""
-    paths = files_at(source, SUFFIXES) if source.is_dir() else []
-    paths = [path for path in paths if path.stem not in there]
+def tables_of_outcomes(source: Path, there: Sequence[str]) -> list[Path]:
+    """Return the files among recordings that look like their table of outcomes."""
     found = []
-    for path in paths:
+    for path in files_at(source, SUFFIXES) if source.is_dir() else ():
         with contextlib.suppress(FileFormatError):  # beside recordings of another format
-            found += [path] * _has_a_row_each(read_table(path), there)
-    if len(found) != 1:
-        return None, ()
-    what = f"{found[0]} has a row for each recording: it looks like the table of outcomes"
-    return found[0], (Ambiguity(what, shlex.join(["--outcomes", str(found[0])])),)
+            found += [path] * (path.stem not in there and _has_a_row_each(read_table(path), there))
+    return found
 
 
 def _has_a_row_each(table: Table, episodes: Sequence[str]) -> bool:

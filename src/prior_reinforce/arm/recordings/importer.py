@@ -23,6 +23,7 @@ from prior_reinforce.arm.recordings.outcomes import (
     OUTCOMES_FILE,
     Outcomes,
     check_rows,
+    doubts_of_tables,
     in_order,
     outcomes_of,
     read_outcomes,
@@ -273,9 +274,10 @@ class Recordings:
             UnclearUnitsError: The same, where something is unclear.
             FileFormatError: The table is missing or damaged.
         """
-        guessed: tuple[Ambiguity, ...] = ()
-        if given is None and table_beside(self.outcome_places) is None:
-            given, guessed = csv.table_of_outcomes(self.source, self.there)
+        others = [] if given is not None else csv.tables_of_outcomes(self.source, self.there)
+        own = table_beside(self.outcome_places)
+        if own is None and len(others) == 1:
+            given = others[0]
         try:
             found = self._outcomes(given, wanted.outcome_names, may_lack=may_lack)
         except InvalidDemonstrationsError as missing:
@@ -283,8 +285,9 @@ class Recordings:
             raise
         if isinstance(given, Mapping):
             return found, ()
+        doubts = doubts_of_tables(own, others, found)
         found, more = in_units(found, wanted.outcome_units, unit)
-        return found, guessed + more
+        return found, doubts + more
 
     def _outcomes(
         self,

@@ -74,3 +74,25 @@ def telling_word(
                     f"for all rows; call the rows by the recordings' names ({name})"
                 )
     return ""
+
+
+def how_to_renumber(word: str, episodes: Sequence[str], rows: Sequence[str]) -> str:
+    """Say what to do where rows may be numbered otherwise than the episodes; else empty."""
+    ours = [number_of(name, word) for name in episodes]
+    theirs = [digits_at_end(name) for name in rows]
+    if not (all(theirs) and ours and theirs):
+        return ""
+    unlike = not all(ours) or min(map(int, ours)) == min(map(int, theirs))
+    counted = sorted(map(int, theirs))
+    if unlike and counted in ([*range(len(ours))], [*range(1, len(ours) + 1)]):
+        name = episodes[-1]
+        return (
+            f"the table seems to count the {len(ours)} recordings in their order: if it does, call "
+            f"its rows by their names ({counted[-1]} is {name}); else "
+        )
+    if not all(ours) or len({*ours}) < len(ours):
+        return ""
+    first, of_table = min(map(int, ours)), min(map(int, theirs))
+    if first == of_table or len(theirs) > len(ours):
+        return ""
+    return f"the table begins with {of_table}, and they with {first}: renumber it if so; else "

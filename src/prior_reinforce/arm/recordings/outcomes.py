@@ -14,18 +14,25 @@ import math
 import re
 import shlex
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
-from prior_reinforce.arm.recordings.numbering import digits_at_end, number_of, telling_word
+from prior_reinforce.arm.recordings.numbering import (
+    digits_at_end,
+    how_to_renumber,
+    number_of,
+    telling_word,
+)
 from prior_reinforce.arm.recordings.outcome_columns import columns_of, remedy_for
 from prior_reinforce.arm.recordings.recording import ROW_COLUMNS
 from prior_reinforce.arm.recordings.tables import Table, read_table
 from prior_reinforce.arm.recordings.units import (
     CHANNEL_UNITS,
+    Ambiguity,
     is_possible,
     known_unit,
     listed,
@@ -312,6 +319,28 @@ def places_of(episodes: Sequence[str], outcomes: Outcomes) -> dict[str, Place]:
     }
 
 
+def doubts_of_tables(
+    own: Path | None, others: Sequence[Path], found: Outcomes
+) -> tuple[Ambiguity, ...]:
+    """Ask which table is meant where the only one is not called so, or others beside it differ."""
+    unlike = [str(other) for other in others if own is not None and _differs(other, found)]
+    what = f"is taken, but {', '.join(unlike)} says other outcomes: it looks like the right one"
+    if own is None and len(others) == 1:
+        own, what = others[0], "has a row for each recording: it looks like the table of outcomes"
+    elif not unlike:
+        return ()
+    return (Ambiguity(f"{own} {what}", shlex.join(["--outcomes", str(own)])),)
+
+
+def _differs(path: Path, outcomes: Outcomes) -> bool:
+    """Whether a table has the same components, and other numbers for a row of these outcomes."""
+    places, names = dict[str, Place](), outcomes.names
+    with suppress(FileFormatError, InvalidDemonstrationsError):
+        places = places_of(outcomes.episodes, read_outcomes(path, names).only(names))
+    each = zip(outcomes.episodes, outcomes.values, strict=True)
+    return any(e in places and not np.allclose(places[e][:-1], own) for e, own in each)
+
+
 def missing_outcomes(episodes: Sequence[str], outcomes: Outcomes) -> list[str]:
     """Return the episodes that a table lacks, by the rule of `outcomes_of`."""
     picked = _matched(episodes, outcomes)
@@ -341,35 +370,13 @@ def check_rows(
             f"{outcomes.where} has a row for {listed(unknown)} and a column for each episode; "
             "exchange rows and columns"
         )
-    if unknown and (not others or _renumber(there, outcomes)):
+    if unknown and (not others or how_to_renumber(word, there, rows)):
         raise InvalidDemonstrationsError(
             f"{outcomes.where} names episodes {listed(unknown)} that were not found (there are "
-            f"{listed(there)}); {_renumber(there, outcomes)}correct the names, or take out the "
-            "rows of what was not recorded"
+            f"{listed(there)}); {how_to_renumber(word, there, rows)}correct the names, or "
+            "take out the rows of what was not recorded"
         )
     return outcomes
-
-
-def _renumber(episodes: Sequence[str], outcomes: Outcomes) -> str:
-    """What to do where rows may be numbered otherwise than the episodes; else empty."""
-    ours = [number_of(name, outcomes.word) for name in episodes]
-    theirs = [digits_at_end(name) for name in outcomes.episodes]
-    if not (all(theirs) and ours and theirs):
-        return ""
-    unlike = not all(ours) or min(map(int, ours)) == min(map(int, theirs))
-    rows = sorted(map(int, theirs))
-    if unlike and rows in ([*range(len(ours))], [*range(1, len(ours) + 1)]):
-        name = episodes[-1]
-        return (
-            f"the table seems to count the {len(ours)} recordings in their order: if it does, call "
-            f"its rows by their names ({rows[-1]} is {name}); else "
-        )
-    if not all(ours) or len({*ours}) < len(ours):
-        return ""
-    first, of_table = min(map(int, ours)), min(map(int, theirs))
-    if first == of_table or len(theirs) > len(ours):
-        return ""
-    return f"the table begins with {of_table}, and they with {first}: renumber it if so; else "
 
 
 def in_order(source: Path, motions: Sequence[str], outcomes: Outcomes, advice: str) -> Outcomes:
@@ -411,9 +418,10 @@ def outcomes_of(
     picked, missing = _matched(episodes, outcomes), missing_outcomes(episodes, outcomes)
     if missing:
         back = advice(missing)
+        renumber = how_to_renumber(outcomes.word, episodes, there)
         raise InvalidDemonstrationsError(
             f"no outcome for episodes {listed(missing)} in {outcomes.where} (it has "
-            f"{listed(there) or 'none'}); {_renumber(episodes, outcomes)}measure and add them, or "
+            f"{listed(there) or 'none'}); {renumber}measure and add them, or "
             f"leave those episodes out, --leave-out {shlex.join(missing)}{'; ' * bool(back)}{back}"
         )
     rows = [there.index(picked[episode]) for episode in episodes]
