@@ -587,3 +587,17 @@ def test_an_echo_of_joint_states(tmp_path, frame, rest):
 )
 def test_rows_of_others_with_words_have_no_names(tmp_path, row):
     assert not headed(tmp_path, *(row.format(k=k) for k in range(4))).named
+
+
+@pytest.mark.parametrize(
+    "other",
+    ["u,v,x\n1,2,3\n2,3,4", "k,fx\n1,2", "t,u,v\n0,1,2\n0.01,2,3", "joint,q\njoint1,\njoint2,"],
+)
+def test_a_file_that_is_no_recording_is_refused_with_what_leaves_it_out(tmp_path, other):
+    write_outcomes(write_csv(tmp_path))
+    (tmp_path / "calibration.csv").write_text(other)
+    with pytest.raises((FileFormatError, InvalidDemonstrationsError)) as refused:
+        import_demonstrations(tmp_path, joints=JOINTS)
+    assert "--leave-out calibration" in str(refused.value)
+    kept = import_demonstrations(tmp_path, joints=JOINTS, leave_out=["calibration"])
+    assert kept.demonstrations.n == N

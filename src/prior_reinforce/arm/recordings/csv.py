@@ -29,6 +29,7 @@ from prior_reinforce.arm.recordings.recording import (
     Recording,
     files_at,
     natural_order,
+    or_leave_out,
     recorded,
     unread,
     without_units,
@@ -96,24 +97,26 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         if len(paths) > 1 and path.stem in (options.leave_out or ()):
             yield path.stem, unread
             continue
-        table = read_table(path, options.delimiter, options.decimal)
-        if len(paths) > 1 and _has_a_row_each(table, stems):
-            continue
-        table = headed(table, options.joints)
-        table = with_whole_dates(with_heads(table))
-        said = said_above(path)
-        if not table.names or len(table) < 2:
-            raise FileFormatError(
-                f"{path} has {len(table)} frames; expected a line of column names and two frames "
-                "or more"
-            )
-        column, names, guessed = _throws(table, path.stem, options, alone=len(paths) == 1)
-        rows = names.count("")
+        guarded = partial(or_leave_out, path.stem, among_others=len(paths) > 1)
+        with guarded():
+            table = read_table(path, options.delimiter, options.decimal)
+            if len(paths) > 1 and _has_a_row_each(table, stems):
+                continue
+            table = headed(table, options.joints)
+            table = with_whole_dates(with_heads(table))
+            if not table.names or len(table) < 2:
+                raise FileFormatError(
+                    f"{path} has {len(table)} frames; expected a line of column names and two "
+                    "frames or more"
+                )
+            column, names, guessed = _throws(table, path.stem, options, alone=len(paths) == 1)
+        rows, said = names.count(""), said_above(path)
         of_none = f"{rows} rows left out, which are of no episode"
         remarks = (of_none,) * (0 < rows < len(names))
         for episode in sorted({*names} - {""} or {""}, key=natural_order):
             own = table.rows([i for i, name in enumerate(names) if name == episode])
-            yield episode, partial(_episode, own, episode, options, column, guessed, said, remarks)
+            how = episode, options, column, guessed, said, remarks
+            yield episode, guarded()(partial(_episode, own, *how))
 
 
 def tables_of_outcomes(source: Path, there: Sequence[str]) -> list[Path]:

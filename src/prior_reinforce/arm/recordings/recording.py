@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -253,6 +254,18 @@ def named_damage(path: Path, what: str) -> Iterator[None]:
             f"cannot read {path} as {what} ({type(error).__name__}: {words}); it is damaged or "
             "something else: copy it again from where it was recorded, or say its format"
         ) from error
+
+
+@contextmanager
+def or_leave_out(episode: str, *, among_others: bool) -> Iterator[None]:
+    """Add to what is said against a file that others beside it do without that one."""
+    try:
+        yield
+    except (FileFormatError, InvalidDemonstrationsError) as error:
+        if not among_others or "--leave-out" in str(error):
+            raise
+        what = f"{error}; or if that is no recording, --leave-out {shlex.quote(episode)}"
+        raise type(error)(what) from error
 
 
 def refuse_pointers(source: Path) -> None:

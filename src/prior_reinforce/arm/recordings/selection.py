@@ -18,7 +18,7 @@ from prior_reinforce.arm.recordings.naming import (
     missing_channels,
     numbered_like,
 )
-from prior_reinforce.arm.recordings.recording import Recording
+from prior_reinforce.arm.recordings.recording import Recording, or_leave_out
 from prior_reinforce.arm.recordings.takes import in_one_unit, odd_takes
 from prior_reinforce.arm.recordings.units import (
     Ambiguity,
@@ -109,7 +109,11 @@ def select(
         )
     joints, guessed = _guess_names(recordings[0], joints) if unnamed else (joints, ())
     _refuse_places(joints, names, plan_units)
-    columns = [_columns(recording, joints, names, plan_units) for recording in recordings]
+    columns = []
+    for recording in recordings:
+        others = any(find_channels(joints, r.names) for r in recordings if r.named)
+        with or_leave_out(recording.episode, among_others=others):
+            columns.append(_columns(recording, joints, names, plan_units))
     if given == "each" and not recordings[0].named:
         stated = [stated[i] for i in find_channels(names, joints) or range(len(joints))]
     if UNIT in (units or ()):
