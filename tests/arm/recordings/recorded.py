@@ -258,6 +258,8 @@ def write_bag(
     shuffled: bool = False,
     fingers: bool = False,
     gripper_apart: bool = False,
+    halves: bool = False,
+    lost: int | None = None,
     trajectory: bool = False,
     stamped: bool = True,
 ) -> Path:
@@ -312,9 +314,12 @@ def write_bag(
             if shuffled:
                 order = rng.permutation(len(joints))
                 joints, positions = [joints[k] for k in order], positions[order]
-            messages.append((s, state(s, joints, positions)))
+            parts = [slice(3), slice(3, None)] if halves else [slice(None)]
+            messages += [(s, state(s, joints[own], positions[own])) for own in parts]
             if gripper_apart:
                 messages.append((s, state(s, ["finger_left"], np.array([0.04]))))
+    if lost is not None:
+        del messages[lost]
     if kind == "ros1":
         with Writer1(path) as writer:
             connection = writer.add_connection(topic, type_name, typestore=store)

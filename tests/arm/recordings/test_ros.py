@@ -330,3 +330,19 @@ def test_a_bag_without_joints_is_told_by_what_it_has(tmp_path):
         bag.write(topic, 1, store.serialize_cdr(message, kind))
     with pytest.raises(FileFormatError, match=r"it has /force \(std_msgs/msg/Float64\): write"):
         read_recordings(tmp_path / "bag")
+
+
+@pytest.mark.parametrize("kind", ["ros1", "mcap"])
+@pytest.mark.parametrize("lost", [None, 40])
+def test_joints_that_come_in_two_messages_in_turn_are_put_together(tmp_path, kind, lost):
+    bag = write_bag(
+        tmp_path / ("a.bag" if kind == "ros1" else "a"), 0, kind=kind, halves=True, lost=lost
+    )
+    if lost is not None:
+        with pytest.raises(FileFormatError, match="joint_state_publisher"):
+            read_recordings(bag, joints=JOINTS)
+        return
+    (read,) = read_recordings(bag, joints=JOINTS)
+    columns = [read.names.index(joint) for joint in JOINTS]
+    np.testing.assert_allclose(read.positions[:, columns], sampled(0, 100)[1])
+    assert "taken at the first ones' times" in read.remarks[0]

@@ -302,6 +302,10 @@ def _states(
     if wanted is None:
         wanted = Counter(tuple(sorted(m.content.name)) for m in messages).most_common(1)[0][0]
     kept = [m for m in messages if set(wanted) <= set(m.content.name)]
+    skipped = "without all joints skipped"
+    if not kept and (kept := _first_in_turn(messages, wanted)):
+        wanted = tuple(joint for joint in wanted if joint in kept[0].content.name)
+        skipped = "have the other joints, which are taken at the first ones' times"
     if not kept:
         raise FileFormatError(
             f"{bag}: no message holds all of {list(wanted)}; joints in it are {say_names(every)}: "
@@ -309,7 +313,7 @@ def _states(
         )
     kept, remarks = _of_one_publisher(bag, [m for m in kept if len(m.content.position)], wanted)
     if len(kept) < len(messages):
-        remarks.append(f"{len(messages) - len(kept)} messages without all joints skipped")
+        remarks.append(f"{len(messages) - len(kept)} messages {skipped}")
     remarks += notes
     # Other channels of these messages, such as fingers, stay available by name.
     names = tuple(n for n in kept[0].content.name if all(n in m.content.name for m in kept))
@@ -331,6 +335,18 @@ def _states(
     times, source, said = _clock_of(bag, sent, came, options.time_column)
     clock = options.clock(name, len(kept), stamps=times, name=source, unit="ns")
     return recorded(name, clock, positions, names, remarks=(*remarks, *said), beside=elsewhere)
+
+
+def _first_in_turn(messages: list[Message], wanted: Sequence[str]) -> list[Message]:
+    """The first of the messages that come in turn, each with its own joints; none if they do not.
+
+    Nothing is lost of them: each turn has one message of each.
+    """
+    some = [m for m in messages if {*wanted} & {*m.content.name} and len(m.content.position)]
+    said = [frozenset(m.content.name) for m in some]
+    n = len({*said})
+    in_turn = len({*said[:n]}) == n and said[n:] == said[:-n]
+    return some[::n] if in_turn and {*wanted} <= frozenset().union(*said) else []
 
 
 def _of_one_publisher(
