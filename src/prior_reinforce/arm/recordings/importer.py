@@ -128,7 +128,7 @@ def import_demonstrations(
         gate: The gate's settings for that check.
         take_guesses: Infer missing or implausible units, times and names instead of raising.
         declared: Says how motions of a format may be moved, if they may.
-        before: Demonstrations beside which these are to be, as in `inspect`.
+        before: Demonstrations beside which these are to be, in their turns, signs and units.
         options: Fields of `ReadOptions`.
 
     Raises:
@@ -138,17 +138,9 @@ def import_demonstrations(
         ConfigurationError: Settings that contradict each other.
         MissingExtraError: The format's optional library is not installed.
     """
-    wanted = Wanted(
-        None if names is None else tuple(names),
-        plan_units,
-        outcome_names,
-        outcome_units,
-        preprocessing,
-        robot,
-        gate,
-        declared,
-        before,
-    )
+    called = None if names is None else tuple(names)
+    form = called, plan_units, outcome_names, outcome_units
+    wanted = Wanted(*form, preprocessing, robot, gate, declared, before)
     recordings = read(source, ReadOptions(**options))
     selection = recordings.select(wanted)
     asked = () if take_guesses else selection.ambiguities

@@ -55,26 +55,17 @@ at an arm's length 0.01 rad is as much."""
 
 @dataclass(frozen=True, eq=False)
 class Wanted:
-    """What recordings are to become, and what they have to keep to."""
+    """What recordings are to become and to keep to: arguments of `import_demonstrations`."""
 
     names: tuple[str, ...] | None = None
-    """Of the joints in the plan; None keeps the recorded ones."""
     plan_units: Sequence[str] | None = None
-    """Of the joints in the plan; None is radians for angles, metres for lengths."""
     outcome_names: Sequence[str] | None = None
-    """Of the outcome's components; None takes those of the outcomes."""
     outcome_units: Sequence[str] | None = None
-    """Of the components; None takes those that the outcomes state, or metres."""
     preprocessing: Preprocessing | None = None
-    """Time step, horizon and trimming; None takes the defaults."""
     robot: RobotLimits | None = None
-    """Limits that every demonstration is checked against; None checks none."""
     gate: GateSettings | None = None
-    """The gate's settings for that check."""
     declared: Callable[[PlanFormat], Symmetry | None] = lambda _: None
-    """Says how motions of a format may be moved, if they may."""
     before: Demonstrations | None = None
-    """Demonstrations beside which these are to be, in their turns, signs and units."""
 
 
 @dataclass(frozen=True, eq=False)
