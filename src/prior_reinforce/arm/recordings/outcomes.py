@@ -324,7 +324,7 @@ def doubts_of_tables(
 ) -> tuple[Ambiguity, ...]:
     """Ask which table is meant where the only one is not called so, or others beside it differ."""
     unlike = [str(other) for other in others if own is not None and _differs(other, found)]
-    what = f"is taken, but {', '.join(unlike)} says other outcomes: it looks like the right one"
+    what = f"looks like the table of outcomes, though {', '.join(unlike)} says others"
     if own is None and len(others) == 1:
         own, what = others[0], "has a row for each recording: it looks like the table of outcomes"
     elif not unlike:
