@@ -18,6 +18,7 @@ import unicodedata
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +39,9 @@ _LARGEST_NPZ = 4_000_000_000
 """Bytes of all arrays in a file; ours: an hour of an arm at 1 kHz is a tenth of it. A small file
 that unpacks to more is a trap."""
 
+_POINTER = b"version https://git-lfs.github.com/spec/"
+_LARGEST_POINTER, _MOST_FILES = 1024, 5_000
+"""Bytes of a Git LFS pointer (its specification), and files that are looked through for one."""
 _FORMULAS = ("=", "+", "-", "@", "\t", "\r")
 """What a spreadsheet takes for the start of a formula, which may run a program (OWASP, CSV
 injection)."""
@@ -94,6 +98,17 @@ def open_npz(path: Path, remedy: str, largest: int | None = None) -> Iterator[np
         raise FileFormatError(
             f"{path} cannot be read ({without_advice(error)}); {remedy}"
         ) from error
+
+
+def refuse_pointers(source: Path) -> None:
+    """Raise FileFormatError if a file is what Git LFS leaves in the place of one."""
+    for path in [source] if source.is_file() else islice(sorted(source.rglob("*")), _MOST_FILES):
+        if path.is_file() and path.stat().st_size < _LARGEST_POINTER:
+            with path.open("rb") as file:
+                if file.read(len(_POINTER)) == _POINTER:
+                    raise FileFormatError(
+                        f"{path} is a Git LFS pointer, not the file itself; fetch it: git lfs pull"
+                    )
 
 
 def as_cell(text: str) -> str:

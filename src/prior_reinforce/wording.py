@@ -74,6 +74,12 @@ def say_count(n: int, what: str) -> str:
     return f"{n} {what}" if n == 1 else f"{n} {what}s"
 
 
+def listed(items: Sequence[str], separator: str = ", ", most: int = 12) -> str:
+    """Join the first items, and count the rest."""
+    more = f" and {len(items) - most} more" if len(items) > most else ""
+    return separator.join(items[:most]) + more
+
+
 def in_words(form: OutcomeFormat) -> bool:
     """Whether words describe outcomes: lengths in metres, at most three of them."""
     return form.outcome_dim <= len(WORDS) and set(form.units) == {"m"}

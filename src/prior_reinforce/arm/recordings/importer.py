@@ -31,19 +31,20 @@ from prior_reinforce.arm.recordings.outcomes import (
 )
 from prior_reinforce.arm.recordings.preprocessing import Preprocessing, at_rests
 from prior_reinforce.arm.recordings.preview import Preview
-from prior_reinforce.arm.recordings.recording import Episodes, Recording, has_files, refuse_pointers
+from prior_reinforce.arm.recordings.recording import Episodes, Recording, has_files
 from prior_reinforce.arm.recordings.selection import Selection, select
 from prior_reinforce.arm.recordings.takes import doubts_of_times, pauses, several_throws, ways_back
-from prior_reinforce.arm.recordings.units import Ambiguity, listed, raise_if_ambiguous
+from prior_reinforce.arm.recordings.units import Ambiguity, raise_if_ambiguous
 from prior_reinforce.arm.robots.gate_settings import GateSettings
 from prior_reinforce.arm.robots.limits import RobotLimits
 from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidDemonstrationsError
 from prior_reinforce.extras import check_installed
+from prior_reinforce.files import refuse_pointers
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.symmetry import Symmetry
-from prior_reinforce.wording import as_html
+from prior_reinforce.wording import as_html, listed
 
 
 @dataclass(frozen=True)
@@ -401,8 +402,7 @@ def read(source: str | os.PathLike[str], options: ReadOptions | None = None) -> 
     missing = [e for e in (*wanted, *(options.leave_out or ())) if e not in there]
     if missing or not read_ones:
         what = f"no episode {', '.join(missing)}" if missing else "no episode is left"
-        names = ", ".join(there)
-        raise InvalidDemonstrationsError(f"{what} in {source}; it has {names}: name those")
+        raise InvalidDemonstrationsError(f"{what} in {source}; it has {listed(there)}: name those")
     chosen = tuple(read_ones[name] for name in wanted if name in read_ones)
     return Recordings(source, kind, options, chosen, tuple(there))
 

@@ -35,7 +35,6 @@ from prior_reinforce.arm.recordings.units import (
     Ambiguity,
     is_possible,
     known_unit,
-    listed,
     split_unit,
 )
 from prior_reinforce.arrays import Points
@@ -43,6 +42,7 @@ from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError
 from prior_reinforce.files import as_cell, from_cell, named_disk_errors, write
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.units import base_of
+from prior_reinforce.wording import listed
 
 OUTCOMES_FILE = "outcomes.csv"
 SD = "sd"

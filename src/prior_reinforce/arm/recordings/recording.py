@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,9 +26,6 @@ Positions = Float[np.ndarray, "T D"]
 """D channels at T times, in their units."""
 Episodes = Iterable[tuple[str, Callable[[], "Recording"]]]
 """What a format's reader yields: names, and how to read each; left-out episodes are never read."""
-_POINTER = b"version https://git-lfs.github.com/spec/"
-_LARGEST_POINTER, _MOST_FILES = 1024, 5_000
-"""Bytes of a Git LFS pointer (its specification), and files that are looked through for one."""
 _WIDER = 5
 """Times as many columns without names as frames that no motion has. Ours."""
 _DETOUR = 1.5
@@ -266,17 +262,6 @@ def or_leave_out(episode: str, *, among_others: bool) -> Iterator[None]:
             raise
         what = f"{error}; or if that is no recording, --leave-out {shlex.quote(episode)}"
         raise type(error)(what) from error
-
-
-def refuse_pointers(source: Path) -> None:
-    """Raise FileFormatError if a file is what Git LFS leaves in the place of one."""
-    for path in [source] if source.is_file() else islice(sorted(source.rglob("*")), _MOST_FILES):
-        if path.is_file() and path.stat().st_size < _LARGEST_POINTER:
-            with path.open("rb") as file:
-                if file.read(len(_POINTER)) == _POINTER:
-                    raise FileFormatError(
-                        f"{path} is a Git LFS pointer, not the file itself; fetch it: git lfs pull"
-                    )
 
 
 def natural_order(name: object) -> tuple[tuple[int, str], ...]:

@@ -23,13 +23,13 @@ from prior_reinforce.arm.recordings.takes import in_one_unit, odd_takes
 from prior_reinforce.arm.recordings.units import (
     Ambiguity,
     conversion,
-    listed,
     say_names,
     split_unit,
 )
 from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.plans.whole_turns import TURN
+from prior_reinforce.wording import listed
 
 _MOST_LOST = 0.1
 """Share of an episode's frames that may be lost. Ours: lost packets come in bursts of some frames;

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from prior_reinforce.errors import ConfigurationError, UnclearUnitsError
 from prior_reinforce.units import STATED, UNITS, factor, spelt, units_of, without_number
+from prior_reinforce.wording import listed
 
 SECONDS = units_of("time")
 """Units of time, in [s]."""
@@ -152,12 +153,6 @@ def say_names(names: Sequence[str]) -> str:
         else:
             groups.append([name])
     return listed([g[0] if len(g) == 1 else f"{g[0]} to {g[-1]}" for g in groups])
-
-
-def listed(items: Sequence[str], separator: str = ", ") -> str:
-    """Join up to twelve items, and count the rest."""
-    more = f" and {len(items) - 12} more" if len(items) > 12 else ""
-    return separator.join(items[:12]) + more
 
 
 def _follows(before: str, name: str) -> bool:
