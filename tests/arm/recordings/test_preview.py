@@ -8,6 +8,9 @@ from matplotlib.image import imread
 
 from prior_reinforce.arm.recordings import Preprocessing, import_demonstrations
 from prior_reinforce.arm.recordings.preview import hull_corners
+from prior_reinforce.arm.robots.gate_settings import GateSettings
+from prior_reinforce.plans.kinematics import Chain
+from prior_reinforce.plans.symmetry import TurnPath, TurnPoses, turn_and_scale
 from tests.arm.recordings.recorded import (
     JOINTS,
     OUTCOMES,
@@ -169,3 +172,41 @@ def test_outcomes_that_all_lie_at_the_base_are_doubted(tmp_path, scale, said):
     near = {name: (scale * x, scale * y) for name, (x, y) in OUTCOMES.items()}
     text = import_demonstrations(folder, outcomes=near).preview.text
     assert ("no errors from a target" in text) == said
+
+
+@pytest.mark.parametrize(
+    ("place", "unit", "said"),
+    [
+        ((0.6, 0.2), "m", None),  # the hand touches it
+        ((0.6, 0.4), "m", None),  # a tool in it may
+        ((0.6, -0.5), "m", "0.7 m"),  # the base is turned against the table
+        ((0.6, 1.2), "cm", None),
+        ((0.0, 0.0), "m", None),  # carried: nothing lies at the base
+    ],
+)
+def test_a_hand_that_stays_far_from_where_the_object_lies_is_doubted(folder, place, unit, said):
+    preview = import_demonstrations(folder).preview
+    demos = preview.demonstrations
+    plans = demos.plans.copy()
+    plans[:, :, 0], plans[:, :, 1] = np.linspace(0.3, 0.8, demos.horizon), 0.2
+    plans[0, :, 1] = place[1]  # one that comes there
+    symmetry = turn_and_scale(TurnPoses(place, (0, 1)), place)
+    form = replace(demos.outcome_format, units=(unit, unit))
+    demos = replace(demos, plans=plans, outcome_format=form).with_symmetry(symmetry)
+    text = replace(preview, demonstrations=demos).text
+    assert ("where the object is said to lie" in text) == (said is not None)
+    if said:
+        assert f"no nearer than {said} to (0.6, -0.5)" in text
+        assert "in throw_1 to throw_5:" in text
+
+
+@pytest.mark.parametrize(("tool", "said"), [(None, True), ((0.5, 0.0, 0.0), False)])
+def test_the_hand_that_comes_to_a_place_has_its_tool(folder, tool, said):
+    """One joint with a flange 0.3 m out, and a tool as far as the place."""
+    gate = GateSettings(tool_tip=tool)
+    preview = import_demonstrations(folder, gate=gate).preview
+    chain = Chain(((0.0,) * 6,), ((0.0, 0.0, 1.0),), (0.3, 0.0, 0.0, 0.0, 0.0, 0.0))
+    symmetry = turn_and_scale(TurnPath(chain, (0.8, 0.0), (0,)), (0.8, 0.0))
+    demos = replace(preview.demonstrations, plans=0.0 * preview.demonstrations.plans)
+    preview = replace(preview, demonstrations=demos.with_symmetry(symmetry))
+    assert ("the hand comes no nearer" in preview.text) == said

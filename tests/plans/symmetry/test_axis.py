@@ -8,7 +8,15 @@ import pytest
 import prior_reinforce as pr
 from prior_reinforce.arm.robots.limits import match_joints
 from prior_reinforce.arm.robots.presets import robot_limits
-from prior_reinforce.plans.symmetry import Polar, TurnPoses, find_axis, hand_paths, turn_and_scale
+from prior_reinforce.plans.kinematics import tool_tip
+from prior_reinforce.plans.symmetry import (
+    Polar,
+    TurnPath,
+    TurnPoses,
+    find_axis,
+    hand_paths,
+    turn_and_scale,
+)
 from prior_reinforce.plans.symmetry.moves import about_vertical
 
 
@@ -68,6 +76,14 @@ def test_few_demonstrations_raise_no_false_alarm():
     for pair in itertools.combinations(range(4), 2):
         found = find_axis(paths[list(pair)], outcomes[list(pair)], chart)
         assert found is None or not found.doubted
+
+
+def test_the_hand_is_where_the_turned_arm_has_its_tip():
+    chain, tip = robot_limits("panda").chain, (0.0, 0.1, 0.2)
+    plans = np.random.default_rng(0).normal(size=(2, 5, 8))
+    symmetry = turn_and_scale(TurnPath(chain, (0.4, 0.0), tuple(range(1, 8))), (0.4, 0.0))
+    expected = tool_tip(chain, plans[:, :, 1:], tip)[..., :2]
+    assert np.array_equal(hand_paths(symmetry, plans, tip=tip), expected)
 
 
 def test_the_hand_is_where_poses_say():

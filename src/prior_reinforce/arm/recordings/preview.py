@@ -15,11 +15,14 @@ from jaxtyping import Float, Int
 
 from prior_reinforce.arm.recordings.fit import slips
 from prior_reinforce.arm.recordings.inspection import Inspection, in_rows, say_small
+from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.errors import WorkspaceError
 from prior_reinforce.files import named_disk_errors
 from prior_reinforce.generators.timing.events import find_transitions
 from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.symmetry import Polar, hand_paths
 from prior_reinforce.terminal import plain
+from prior_reinforce.units import factor
 from prior_reinforce.wording import axes_of, in_words
 
 if TYPE_CHECKING:
@@ -34,6 +37,9 @@ _LEAST_RANGE = 0.2
 """Smallest vertical range of a channel's panel, as a share of the largest motion in its unit."""
 _AT_THE_BASE = 0.2
 """So near the base, in [m], nothing is thrown or pushed (ours)."""
+_AT_THE_PLACE = 0.3
+"""So near a place, in [m], the tool of a hand touches what lies there. Ours: curling's flange comes
+within 0.2 of the stone, and a tool in it is seldom longer."""
 Corners = Int[np.ndarray, " corners"]
 PlanePoints = Float[np.ndarray, "n 2"]
 
@@ -69,7 +75,8 @@ class Preview:
             "look at that in the table"
             for slip in slips(self.demonstrations, self.episodes)
         )
-        return (*self.inspection.remarks, *self._near_base(), *alike, *doubted)
+        places = (*self._near_base(), *self._far_from_place())
+        return (*self.inspection.remarks, *places, *alike, *doubted)
 
     def _near_base(self) -> Iterator[str]:
         """Say it if all outcomes lie at the base, as errors from a target would."""
@@ -79,6 +86,27 @@ class Preview:
             yield (
                 f"all outcomes are within {100 * far:.2g} cm of the base: they are to be places, "
                 "counted from the base, and no errors from a target"
+            )
+
+    def _far_from_place(self) -> Iterator[str]:
+        """Say it of hands that never come near the place where the object is said to lie."""
+        demos, gate = self.demonstrations, self.inspection.wanted.gate
+        chart = None if demos.symmetry is None else demos.symmetry.chart
+        if demos.symmetry is None or not isinstance(chart, Polar) or not any(chart.centre):
+            return  # carried, or anywhere
+        tip = (gate and gate.tool_tip) or (0.0, 0.0, 0.0)
+        paths = hand_paths(demos.symmetry, demos.plans, tip=tip)
+        if paths is None:
+            return  # carried by an arm that does not stand at the origin
+        nearest = np.linalg.norm(paths - chart.centre, axis=-1).min(axis=1)
+        unit = demos.outcome_format.units[0]
+        far = np.flatnonzero(nearest * (factor(unit, "m") or 1.0) > _AT_THE_PLACE)
+        if far.size:
+            (x, y), where = chart.centre, say_names([self.episodes[i] for i in far])
+            yield (
+                f"the hand comes no nearer than {nearest[far].min():.3g} {unit} to ({x:g}, {y:g}), "
+                f"where the object is said to lie, in {where}: see [symmetry] object, and whether "
+                "it is counted in the arm's base frame"
             )
 
     @property

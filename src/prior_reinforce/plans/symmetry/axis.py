@@ -16,7 +16,7 @@ from jaxtyping import Float
 from prior_reinforce.arrays import Plans, Point, Points
 from prior_reinforce.plans.kinematics import Chain, tool_tip
 from prior_reinforce.plans.symmetry.charts import Polar
-from prior_reinforce.plans.symmetry.moves import TurnIncrements, TurnPoses
+from prior_reinforce.plans.symmetry.moves import TurnIncrements, TurnPath, TurnPoses
 from prior_reinforce.plans.symmetry.symmetry import Symmetry
 
 Paths = Float[np.ndarray, "N W 2"]
@@ -75,24 +75,31 @@ class Axis:
 
 
 def hand_paths(
-    symmetry: Symmetry, plans: Plans, chain: Chain | None = None, joints: Sequence[int] = ()
+    symmetry: Symmetry,
+    plans: Plans,
+    chain: Chain | None = None,
+    joints: Sequence[int] = (),
+    tip: Sequence[float] = (0.0,) * 3,
 ) -> Float[np.ndarray, "N H 2"] | None:
     """Return where the hand goes, seen from above, [m]; None where plans do not say it.
 
     Args:
         symmetry: Its turn names the columns of poses or increments.
         plans: Shape (N, H, D).
-        chain: The arm, where plans are of its joints.
+        chain: The arm, where plans are of its joints; None takes the turn's own.
         joints: Columns of its joints, in its order.
+        tip: The hand in the flange's frame of joints, [m].
     """
     for move in symmetry.moves:
         if isinstance(move, TurnPoses):
             return plans[:, :, move.place]
         if isinstance(move, TurnIncrements):
             return np.cumsum(plans[:, :, move.place], axis=1) + move.start
+        if isinstance(move, TurnPath) and chain is None:
+            chain, joints = move.chain, move.columns
     if chain is None or not joints:
         return None
-    return tool_tip(chain, plans[:, :, list(joints)])[..., :2]
+    return tool_tip(chain, plans[:, :, list(joints)], tip)[..., :2]
 
 
 def find_axis(paths: Float[np.ndarray, "N H 2"], outcomes: Points, declared: Polar) -> Axis | None:
