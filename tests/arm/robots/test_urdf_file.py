@@ -208,6 +208,11 @@ READ = [
         {"tip": "right_tool0"},
     ),
     Urdf(
+        "flange and tool0, with a prefix",
+        [*arm(SIX), fixed("f", "r1_flange"), fixed("t", "r1_tool0")],
+        tip="r1_tool0",
+    ),
+    Urdf(
         "dont_collapse",
         [*numbered(6), fixed("cam", "cam_link", attributes='dont_collapse="true"')],
         tip="link6",
@@ -294,6 +299,19 @@ ASKED = [
 ]
 REFUSED = [
     Urdf("two arms", [fixed("b", "torso"), *side("left"), *side("right")], says="with --tip"),
+    Urdf(
+        "two arms with flange and tool0 each",
+        [
+            fixed("b", "torso"),
+            *side("left"),
+            fixed("lf", "left_flange"),
+            fixed("lt", "left_tool0"),
+            *side("right"),
+            fixed("rf", "right_flange"),
+            fixed("rt", "right_tool0"),
+        ],
+        says="ends in left_tool0, right_tool0; say which",
+    ),
     Urdf("an arm on a lift", [LIFT, *arm(SEVEN)], says="--base torso_lift_link"),
     Urdf(
         "a lift that slides behind the arm",

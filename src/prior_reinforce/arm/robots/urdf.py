@@ -185,9 +185,14 @@ def _flange(
         ends += [link] if free and not of_jaw[link] else []
     most = max(turns.values())
     ends = [link for link in ends if turns[link] == most]
-    named = [n for n in turns if turns[n] == most and n.endswith(_PREFIXED_TIPS)]
-    if len(named) == 1 and not of_jaw[named[0]]:
-        return named[0]
+    named = dict[str, str]()
+    """The flange by convention, by the prefix of its arm."""
+    for tip in _PREFIXED_TIPS:
+        for link in turns:
+            if turns[link] == most and link.endswith(tip) and not of_jaw[link]:
+                named.setdefault(link.removesuffix(tip), link)
+    if len(named) == 1:
+        return next(iter(named.values()))
     last = [joint for joint in _path(ends[0], moving, start) if joint.free] if ends else []
     if len(ends) == 1:
         followed = {joint.mimics for joint in moving.values()}
@@ -201,6 +206,7 @@ def _flange(
         last = [joint for joint in last if all(joint in path for path in paths)]
         jaws = ends
         if 2 * len(last) < most or not last:
+            ends = [*named.values()] if len(named) == len(ends) else ends
             raise UnclearFlangeError(
                 f"it ends in {', '.join(ends[:_MOST_NAMED]) or 'no turning joint'}; say which link "
                 "is the flange with --tip"
