@@ -101,8 +101,8 @@ def test_two_arms_need_the_flange_to_be_named(tmp_path):
 @pytest.mark.parametrize(
     ("attributes", "says"),
     [
-        ('lower="-1" upper="1" effort="1" velocity="0"', "joint a has no velocity limit"),
-        ("", "joint a has no velocity limit"),
+        ('lower="-1" upper="1" effort="1" velocity="0"', "no velocity limit of a"),
+        ("", "no velocity limit of a"),
         ('lower="0" upper="0" effort="1" velocity="1"', "joint a has no range"),
     ],
 )
@@ -110,6 +110,22 @@ def test_what_a_joint_lacks_is_named(tmp_path, attributes, says):
     joints = [("a", "revolute", (0, 0, 1), (0, 0, 0), attributes)]
     with pytest.raises(ConfigurationError, match=says):
         read_urdf(write_urdf(tmp_path / "a.urdf", joints))
+
+
+@pytest.mark.parametrize(
+    ("content", "is_a"),
+    [
+        ("version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 12\n", "git lfs pull"),
+        ("\n<!doctype HTML>\n<html><body>404</body></html>", "a web page"),
+        ("<html><head/></html>", "a web page"),
+    ],
+)
+def test_a_file_that_stands_for_a_urdf_is_told_as_what_it_is(tmp_path, content, is_a):
+    path = tmp_path / "a.urdf"
+    path.write_text(content)
+    with pytest.raises(FileFormatError, match=is_a) as refused:
+        read_urdf(path)
+    assert "export it again" not in str(refused.value)
 
 
 @pytest.mark.parametrize("content", ["", "<robot", "<robot name='a'/>", "<a/>", "x\0y"])
@@ -208,14 +224,15 @@ def test_a_urdf_that_lacks_a_character_is_refused_or_is_the_same_arm(tmp_path):
         ("0 0 0.333", "0 0 1e999", "give 3 finite numbers"),
         ("0 0 0.333", "0 0 ${height}", "give 3 finite numbers"),
         ("0 0 0.333", "0 0 333", "joint a has an <origin> beyond 10 m or a turn"),
-        ('velocity="2"', 'velocity="200"', "joint a has a velocity limit of 200"),
+        ('velocity="2"', 'velocity="200"', "velocity limit of 200 .a."),
         ('upper="2.25"', 'upper="225"', "12.57 rad: -1.5 to 225, in degrees\\?;"),
         ('upper="2.25"', 'upper="-3"', "12.57 rad: -1.5 to -3, exchanged\\?;"),
         ('velocity="2"', 'velocty="2"', "joint a has an unknown velocty in <limit>"),
         ("<axis", "axis", "text in joint base"),
         ('<axis xyz="0 0 1"/>', '<axs xyz="0 0 1"/>', "joint base has an unknown <axs>"),
         ('<link name="link2"/>', "", "names 'link2', which is no link"),
-        ('<child link="tool0"/>', '<child link="link2"/>', "two joints move one link"),
+        ('<child link="tool0"/>', '<child link="link2"/>', "two joints move one link, link2"),
+        ('<link name="link2"/>', '<link name="link2"/>' * 2, "two links are called link2"),
         ('<link name="link2"/>', '<link name="link2"/><link name="x"/>', "2 links hang from no"),
         ('<parent link="link1"/>', '<parent link="tool0"/>', "its joints form a loop"),
         ('name="b" type', 'name="a" type', "two joints are called a"),
@@ -250,12 +267,22 @@ def test_links_that_no_arm_has_are_in_another_unit(tmp_path):
         read_urdf(path)
 
 
-def test_soft_limits_narrow_a_joints_range(tmp_path):
+@pytest.mark.parametrize(
+    ("soft", "says"),
+    [((-1, 9), None), ((0, 0), "0 to 0"), ((2, -1), "2 to -1"), ((3, 9), "3 to 2.25")],
+)
+def test_soft_limits_narrow_a_joints_range(tmp_path, soft, says):
     path = write_urdf(tmp_path / "a.urdf", SMALL)
-    soft = '<safety_controller soft_lower_limit="-1" soft_upper_limit="9" k_velocity="1"/></joint>'
+    low, high = soft
+    ends = f'soft_lower_limit="{low}" soft_upper_limit="{high}"'
+    soft = f'<safety_controller {ends} k_velocity="1"/></joint>'
     text = path.read_text()
     at = text.index("</joint>", text.index('name="a"'))
     path.write_text(text[:at] + soft + text[at + len("</joint>") :])
+    if says:
+        with pytest.raises(ConfigurationError, match=f"joint a .*<safety_controller>: {says}"):
+            read_urdf(path)
+        return
     arm = read_urdf(path)
     assert (arm.lower[0], arm.upper[0]) == (-1, 2.25)
     assert arm.source.endswith("soft limits too")
@@ -346,3 +373,66 @@ def test_a_slide_between_an_arms_own_joints_offers_no_base_behind_them(tmp_path)
     with pytest.raises(FileFormatError, match="say --tip") as refused:
         read_urdf(path)
     assert "--base" not in str(refused.value)
+
+
+RAISED = [
+    J("turntable", "torso", low=0.5, high=2.0),
+    J("lift", "lifted", "prismatic", low=0.0, high=0.8),
+    *arm(["a", "b"]),
+    J("c", "c_link", "continuous"),
+    J("hand", "palm", "prismatic", of="b_link", low=None, high=None),
+]
+
+
+@pytest.mark.parametrize(
+    ("hold", "says"),
+    [
+        ({"lift": 0.8}, None),
+        ({"lift": 60}, "held at 60 m.* 0 to 0.8 m; in centimetres. .*lift=0.6"),
+        ({"lift": 600}, "in millimetres. .*lift=0.6"),
+        ({"lift": -0.2}, "held at -0.2 m.* 0 to 0.8 m$"),
+        ({"lift": 0.4, "a": 90}, "held at 90 rad.* -2.5 to 2.25 rad; in degrees. .*a=1.571"),
+        ({"lift": 0.4, "c": 180}, "-6.283 to 6.283 rad; in degrees. .*c=3.142"),
+        ({"lift": 0.4, "c": -6.283}, None),
+        ({"lift": 0.4, "hand": 0.2}, None),  # its file says no range
+    ],
+)
+def test_a_joint_is_held_in_its_own_range(tmp_path, hold, says):
+    path = tmp_path / "arm.urdf"
+    path.write_text(Urdf("raised", RAISED).text())
+    hold = {"turntable": 1.0, **hold}
+    if says is None:
+        assert read_urdf(path, "c_link", hold=hold).held.items() <= hold.items()
+    else:
+        with pytest.raises(ConfigurationError, match=says):
+            read_urdf(path, "c_link", hold=hold)
+
+
+def test_a_joint_before_the_base_stands_at_0_only_where_that_is_in_its_range(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(Urdf("raised", RAISED).text())
+    with pytest.raises(ConfigurationError, match=r"turntable is held at 0 rad.* 0.5 to 2 rad"):
+        read_urdf(path, "c_link", base="lifted")
+    assert read_urdf(path, "c_link", base="lifted", hold={"turntable": 1.0}).joint_names[0] == "a"
+
+
+def test_what_is_fixed_behind_the_flange_is_named_where_nothing_says_which_it_is(tmp_path):
+    path = tmp_path / "arm.urdf"
+    behind = [fixed("8", "fr3_link8"), fixed("h", "fr3_hand"), fixed("t", "hand_tcp")]
+    path.write_text(Urdf("franka", [*arm(["a", "b"]), *behind]).text())
+    assert (
+        "to b_link; fixed behind it: fr3_link8, fr3_hand, hand_tcp (--tip" in read_urdf(path).source
+    )
+    assert "fixed behind" not in read_urdf(path, "b_link").source
+    path.write_text(Urdf("ur", [*arm(["a", "b"]), fixed("tool", "tool0"), *behind]).text())
+    assert "fixed behind" not in read_urdf(path).source
+
+
+@pytest.mark.parametrize(
+    ("ends", "said"), [((-3, 3), True), ((0, 0), False), ((-1e16, 1e16), False)]
+)
+def test_a_continuous_joints_ends_are_said_to_be_passed_over(tmp_path, ends, said):
+    joints = [*SMALL[:2], ("b", "continuous", (0, 0, 1), (0, 0, 0), limit(*ends, 2))]
+    arm = read_urdf(write_urdf(tmp_path / "a.urdf", joints))
+    assert ("passed over: lower and upper of joint b" in arm.source) == said
+    assert arm.upper[1] == 4 * np.pi

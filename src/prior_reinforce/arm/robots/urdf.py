@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from prior_reinforce.arm.robots.limits import PerJoint, RobotLimits
-from prior_reinforce.arm.robots.urdf_file import RATES, TURNING, TYPES, Joint, read_joints
+from prior_reinforce.arm.robots.limits import ENDLESS, PerJoint, RobotLimits
+from prior_reinforce.arm.robots.urdf_file import LARGEST, TURNING, TYPES, Joint, read_joints
 from prior_reinforce.errors import ConfigurationError, FileFormatError, UnclearFlangeError
 from prior_reinforce.plans.kinematics import UPRIGHT, Chain, Pose, rotation
+from prior_reinforce.wording import listed
 
 _MOST_NAMED, _MOST_JOINTS = 40, 100
 """Links in a message, and turning joints of one arm (ours)."""
@@ -61,24 +62,24 @@ def read_urdf(
         UnclearFlangeError: A gripper's joint may be one of the arm's, or there are several arms.
     """
     name, joints, links, meshes = read_joints(path)
-    moving, hold = {joint.child: joint for joint in joints}, dict(hold or {})
+    moving, hold, unsaid = {joint.child: joint for joint in joints}, dict(hold or {}), tip is None
     try:
         if unknown := hold.keys() - {joint.name for joint in joints}:
             raise ConfigurationError(f"it has no joint {min(unknown)!r} to hold")
         for joint in joints:
-            if joint.name in hold and joint.mimics is not None:
-                raise joint.error(f"follows {joint.mimics} (<mimic>), and does not stand still")
+            if joint.name in hold:
+                joint.check_held(hold[joint.name])
         for link in {tip, base} - {None, *links}:
             few = ", ".join(links[:_MOST_NAMED])
             raise ConfigurationError(f"it has no link {link!r}; it has {few}")
-        tip = _flange(links, moving, base, hold, meshes) if tip is None else tip
+        tip = _flange(links, moving, base, hold, meshes) if unsaid else tip
         chain = _path(tip, moving, base)
         if base is not None and (not chain or chain[0].parent != base):
             raise ConfigurationError(f"link {base} is not on the way to {tip}; say another --base")
         turning = [joint for joint in chain if joint.name not in hold and joint.type in TURNING]
         _refuse_other(chain, turning, tip, hold)
-        limits = np.array([joint.limits() for joint in turning])
-        acceleration, jerk = (_rates(key, turning) for key in RATES)
+        velocity, acceleration, jerk = (_largest(key, turning) for key in LARGEST)
+        lower, upper = np.array([joint.range() for joint in turning]).T
         upright = _upright(_path(chain[0].parent, moving), hold)
         kinematics = _chain(chain, hold, upright)
     except (ConfigurationError, FileFormatError) as error:
@@ -88,18 +89,21 @@ def read_urdf(
     source = f"{path.name}, from {chain[0].parent}{f' (z as in {links[0]})' * tilted} to {tip}"
     source += "".join(f", {name} held at {position:g}" for name, position in hold.items())
     source += ", soft limits too" * any("safety_controller" in joint.parts for joint in turning)
-    over = [f"{what} of joint {joint.name}" for joint in joints for what in joint.unknown]
-    if over:
-        source += f"; passed over: {', '.join(over[:3])}"
-        source += f" and {len(over) - 3} more" * (len(over) > 3)
+    # A convention's link is the flange, and what is behind it a tool.
+    behind = _fixed_behind(tip, links, moving) if unsaid and not tip.endswith(_TIPS) else []
+    source += f"; fixed behind it: {listed(behind)} (--tip NAME takes one)" * bool(behind)
+    capped = [j for j in turning if j.type == "continuous" and 0 < np.ptp(j.ends()) < 2 * ENDLESS]
+    over = [f"lower and upper of joint {joint.name}, which is continuous" for joint in capped]
+    over += [f"{what} of joint {joint.name}" for joint in joints for what in joint.unknown]
+    source += f"; passed over: {listed(over, most=3)}" * bool(over)
     return RobotLimits(
         robot=name,
         firmware="any",
         source=source,
         joint_names=tuple(joint.name for joint in turning),
-        lower=limits[:, 0],
-        upper=limits[:, 1],
-        velocity=limits[:, 2],
+        lower=lower,
+        upper=upper,
+        velocity=velocity,
         acceleration=acceleration,
         jerk=jerk,
         chain=kinematics,
@@ -212,11 +216,7 @@ def _flange(
                 "is the flange with --tip"
             )
     proposed = last[-1].child
-    rigid = {proposed: None}
-    for link in links:
-        if link in moving and moving[link].type == "fixed" and moving[link].parent in rigid:
-            rigid[link] = None
-    fixed = ", ".join([*rigid][1:_MOST_NAMED])
+    fixed = ", ".join(_fixed_behind(proposed, links, moving)[:_MOST_NAMED])
     also = f", or one that is fixed to it: {fixed}" * bool(fixed)
     raise UnclearFlangeError(
         f"joint {moving[jaws[0]].name} looks like a gripper's; say which link is the flange with "
@@ -225,12 +225,28 @@ def _flange(
     )
 
 
+def _fixed_behind(link: str, links: Sequence[str], moving: Mapping[str, Joint]) -> list[str]:
+    """Links that are fixed to a link, and to these, from it outwards."""
+    rigid = {link: None}
+    for other in links:
+        if other in moving and moving[other].type == "fixed" and moving[other].parent in rigid:
+            rigid[other] = None
+    return [*rigid][1:]
+
+
 def _refuse_other(
     chain: Sequence[Joint], turning: Sequence[Joint], tip: str, hold: Mapping[str, float]
 ) -> None:
     """Refuse a chain without turning joints, or with others that are not held."""
     if not turning:
         raise FileFormatError(f"no joint turns between the base and {tip}; say --tip")
+    for joint in turning:
+        if joint.mimics is not None:
+            raise joint.error(
+                f"follows another (<mimic> of {joint.mimics}), and so is no joint of its own; say "
+                "a --tip before it, or, where the arm goes on behind it, --robot none: no limits "
+                "are then checked"
+            )
     if len(turning) > _MOST_JOINTS:
         raise FileFormatError(
             f"{len(turning)} joints turn between the base and {tip}, and an arm has at most "
@@ -250,24 +266,25 @@ def _refuse_other(
         )
 
 
-def _rates(key: str, turning: Sequence[Joint]) -> PerJoint | None:
-    """The accelerations or jerks that the file states; None where it states none."""
-    values = [joint.number("limit", key) for joint in turning]
-    said = [value for value in values if value is not None]
-    if said and len(said) < len(values):
-        others = ", ".join(
-            f"{joint.name} ({value:g})"
-            for joint, value in zip(turning, values, strict=True)
-            if value is not None
-        )
-        raise turning[values.index(None)].error(
-            f"states no {key} in its <limit>, but others do: {others}; write it there, or take the "
-            f"attribute {key} out of theirs"
-        )
-    for joint, value in zip(turning, said, strict=False):
-        if not 0 < value <= RATES[key]:
-            raise joint.error(f"has {key}={value:g} in its <limit>; write the maker's there")
-    return np.array(said) if said else None
+def _largest(key: str, turning: Sequence[Joint]) -> PerJoint | None:
+    """The speeds, accelerations or jerks that the file states; None where it states none.
+
+    Speeds it has to state, and 0 is none.
+    """
+    needed = key == "velocity"
+    values = {joint.name: joint.number("limit", key) for joint in turning}
+    said = {name: value for name, value in values.items() if value or (value == 0 and not needed)}
+    if not (said or needed):
+        return None
+    remedy = "write the maker's, in rad and s, into <limit>"
+    if lacking := [name for name in values if name not in said]:
+        others = ", ".join(f"{name} ({value:g})" for name, value in said.items())
+        remedy += f", or take {key} out of the others': {others}" * (not needed)
+        raise ConfigurationError(f"no {key} limit of {', '.join(lacking)}; {remedy}")
+    beyond = [f"{at:g} ({name})" for name, at in said.items() if not 0 < at <= LARGEST[key]]
+    if beyond:
+        raise ConfigurationError(f"unlikely {key} limit of {', '.join(beyond)}; {remedy}")
+    return np.array([*said.values()])
 
 
 def _upright(before: Sequence[Joint], hold: Mapping[str, float]) -> np.ndarray:
@@ -279,9 +296,14 @@ def _upright(before: Sequence[Joint], hold: Mapping[str, float]) -> np.ndarray:
     Args:
         before: Joints from the root to the link; those that move are at 0.
         hold: Joints that stand still, and where.
+
+    Raises:
+        ConfigurationError: One that turns cannot be at 0, and is not held.
     """
     link = np.eye(3)
     for joint in before:
+        if joint.free and joint.name not in hold:
+            joint.check_held(0.0)
         link = link @ joint.pose(hold.get(joint.name))[:3, :3]
     if math.hypot(link[0, 2], link[1, 2]) < _ROUNDING and link[2, 2] > 0:
         return np.eye(3)

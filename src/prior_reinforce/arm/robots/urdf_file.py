@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cached_property
@@ -23,7 +23,9 @@ import numpy as np
 
 from prior_reinforce.arm.robots.limits import ENDLESS
 from prior_reinforce.errors import ConfigurationError, FileFormatError
+from prior_reinforce.files import refuse_pointers
 from prior_reinforce.plans.kinematics import rotation, rotations_about
+from prior_reinforce.units import UNITS
 
 TURNING = ("revolute", "continuous")
 TYPES = (*TURNING, "fixed", "prismatic", "floating", "planar")
@@ -53,6 +55,12 @@ _LARGEST_FILE = 20_000_000
 _FASTEST, _FARTHEST = 30.0, 10.0
 """What no joint does, in [rad/s], and how long no link is, in [m]. Ours: several times what is on
 the market; a lost decimal point is mostly more."""
+LARGEST = {"velocity": _FASTEST, **RATES}
+"""What no joint does, in rad and s."""
+_BESIDE = 0.01
+"""By how much a joint may be held beyond its range, [rad] or [m] (ours): two written digits."""
+_WEB_PAGE = (b"<!doctype html", b"<html")
+"""Beginnings of what a browser saves in the place of a file, in lower case."""
 _XACRO = "make a URDF of its xacro: xacro arm.urdf.xacro > arm.urdf"
 
 
@@ -71,10 +79,16 @@ def read_joints(path: Path) -> tuple[str, list[Joint], list[str], dict[str, str]
     try:
         if path.stat().st_size > _LARGEST_FILE:
             raise ValueError(f"it has more than {_LARGEST_FILE / 1e6:g} MB, as no URDF has")
+        refuse_pointers(path)
+        with path.open("rb") as file:
+            if file.read(_LONGEST_NAME).lstrip().lower().startswith(_WEB_PAGE):
+                raise FileFormatError(f"{path} is a web page; download the file that it shows")
         root = ElementTree.parse(path, ElementTree.XMLParser(target=_Builder())).getroot()
         joints = _joints_of(root)
         links = _links_of(root, joints)
         return root.get("name") or path.stem, joints, links, _meshes_of(root, joints)
+    except FileFormatError:
+        raise
     except (ElementTree.ParseError, OSError, ValueError, LookupError) as error:
         problem = str(error)[:_LONGEST_PROBLEM]
         raise FileFormatError(
@@ -164,6 +178,29 @@ class Joint:
             raise self.error(f'has <{part} {key}="{text[:80]}">; give {wants}')
         return values
 
+    def check_held(self, position: float) -> None:
+        """Refuse a place, [rad] or [m], at which it cannot stand still."""
+        if self.mimics is not None:
+            raise self.error(f"follows {self.mimics} (<mimic>), and does not stand still")
+        if self.type not in (*TURNING, "prismatic"):
+            if position:
+                raise self.error(f"is {self.type}, and can be held at 0 alone")
+            return
+        turn = 2 * math.pi
+        low, high = (-turn, turn) if self.type == "continuous" else self.ends()
+        if low - _BESIDE <= position <= high + _BESIDE:
+            return
+        unit, others = ("rad", ["deg"]) if self.type in TURNING else ("m", ["cm", "mm"])
+        asked = ""
+        for other in others if abs(position) > UNITS[unit].largest else []:
+            meant = position * UNITS[other].factor
+            if not asked and low <= meant <= high:
+                asked = f"; in {UNITS[other].plural}? then say {self.name}={meant:.4g}"
+        raise self.error(
+            f"is held at {position:g} {unit}, and its range is {low:.4g} to {high:.4g} {unit}"
+            f"{asked}"
+        )
+
     def pose(self, position: float | None) -> np.ndarray:
         """Pose of the frame behind it in the frame before, 4 x 4, with the joint at 0 or held."""
         if self.type in TURNING and "origin" not in self.parts:
@@ -180,8 +217,6 @@ class Joint:
             pose[:3, :3] = pose[:3, :3] @ rotations_about(self.axis(), np.array([position]))[0]
         elif position and self.type == "prismatic":
             pose[:3, 3] += pose[:3, :3] @ self.axis() * position
-        elif position:
-            raise self.error(f"is {self.type}, and can be held at 0 alone")
         return pose
 
     def axis(self) -> tuple[float, float, float]:
@@ -199,36 +234,30 @@ class Joint:
             raise self.error(f"needs an axis of length 1, and {has}; write the one it turns about")
         return x / length, y / length, z / length
 
-    def limits(self) -> tuple[float, float, float]:
-        """Lowest and highest position, and largest speed."""
-        if "mimic" in self.parts:
-            raise self.error(
-                f"follows another (<mimic> of {self.mimics}), and so is no joint of its own; say a "
-                "--tip before it, or, where the arm goes on behind it, --robot none: no limits are "
-                "then checked"
-            )
-        velocity = self.number("limit", "velocity")
-        if not velocity or not 0 < velocity <= _FASTEST:
-            says = "no velocity limit" if not velocity else f"a velocity limit of {velocity:g}"
-            raise self.error(f"has {says}; write the maker's, in [rad/s], into its <limit>")
+    def ends(self) -> tuple[float, float]:
+        """Lower and upper end by its <limit>, infinite where it says none."""
         low, high = self.number("limit", "lower"), self.number("limit", "upper")
-        if self.type == "continuous":
-            low, high = -ENDLESS, ENDLESS
-        soft = [self.number("safety_controller", f"soft_{end}_limit") for end in ("lower", "upper")]
-        if low is not None and high is not None:
-            low = low if soft[0] is None else max(low, soft[0])
-            high = high if soft[1] is None else min(high, soft[1])
-        if low is None or high is None or not -ENDLESS <= low < high <= ENDLESS:
-            why = ""
-            if low is not None and high is not None:
-                beyond = max(abs(low), abs(high)) > ENDLESS
-                why = f": {low:g} to {high:g}"
-                why += ", in degrees?" * beyond + ", exchanged?" * (low > high)
+        return -math.inf if low is None else low, math.inf if high is None else high
+
+    def range(self) -> tuple[float, float]:
+        """Lowest and highest position of a joint that turns, by its soft limits too."""
+        low, high = (-ENDLESS, ENDLESS) if self.type == "continuous" else self.ends()
+        if not -ENDLESS <= low < high <= ENDLESS:
+            why = ", in degrees?" * (ENDLESS < max(abs(low), abs(high)) < math.inf)
+            why += ", exchanged?" * (low > high)
             raise self.error(
-                f"has no range within {ENDLESS:.4g} rad{why}; write lower and upper into its "
-                "<limit>, in rad"
+                f"has no range within {ENDLESS:.4g} rad: {low:g} to {high:g}{why}; write lower and "
+                "upper into its <limit>, in rad"
             )
-        return low, high, velocity
+        soft = [self.number("safety_controller", f"soft_{end}_limit") for end in ("lower", "upper")]
+        lowest = low if soft[0] is None else max(low, soft[0])
+        highest = high if soft[1] is None else min(high, soft[1])
+        if not lowest < highest:
+            raise self.error(
+                f"has no range left by its <safety_controller>: {lowest:g} to {highest:g}, of "
+                f"{low:.4g} to {high:.4g} in its <limit>; mend its soft limits, or take it out"
+            )
+        return lowest, highest
 
 
 class _Builder(ElementTree.TreeBuilder):
@@ -251,6 +280,12 @@ def _name(element: ElementTree.Element) -> str:
     return name
 
 
+def _refuse_repeated(what: str, names: Sequence[str]) -> None:
+    for name, times in Counter(names).most_common(1):
+        if times > 1:
+            raise ValueError(f"two {what.format(name)}")
+
+
 def _joints_of(robot: ElementTree.Element) -> list[Joint]:
     """Every joint, with its type and its ends."""
     space = "".join(robot.tag.rpartition("}")[:2])
@@ -258,7 +293,7 @@ def _joints_of(robot: ElementTree.Element) -> list[Joint]:
         raise ValueError(f"it begins with <{robot.tag[:80]}>, not <robot>")
     if any("xacro}" in element.tag for element in robot.iter()):
         raise ValueError(f"it has elements of xacro: {_XACRO}")
-    found: dict[str, Joint] = {}
+    found: list[Joint] = []
     for element in robot.findall(f"{space}joint"):
         name, kind = _name(element), element.get("type", "")
         if not kind or (kind not in TYPES and _nearly(kind, TYPES)):
@@ -267,13 +302,12 @@ def _joints_of(robot: ElementTree.Element) -> list[Joint]:
         ends = [end.get("link", "") for end in (parent, child) if end is not None]
         if len(ends) != 2 or not all(ends):
             raise ValueError(f"joint {name} has no <parent link> or <child link>")
-        if name in found:
-            raise ValueError(f"two joints are called {name}")
         follows = None if mimic is None else mimic.get("joint", "")
-        found[name] = Joint(name, kind, ends[0], ends[1], follows, element, space)
+        found.append(Joint(name, kind, ends[0], ends[1], follows, element, space))
     if not found:
         raise ValueError("it has no joint, and so is no arm")
-    return list(found.values())
+    _refuse_repeated("joints are called {}", [joint.name for joint in found])
+    return found
 
 
 def _meshes_of(robot: ElementTree.Element, joints: list[Joint]) -> dict[str, str]:
@@ -289,17 +323,16 @@ def _meshes_of(robot: ElementTree.Element, joints: list[Joint]) -> dict[str, str
 
 def _links_of(robot: ElementTree.Element, joints: list[Joint]) -> list[str]:
     """Every link, from the root outwards; all hang from one root."""
-    elements = robot.findall(f"{joints[0].namespace}link")
-    names = {_name(element) for element in elements}
-    moved = Counter(joint.child for joint in joints)
-    if len(names) < len(elements) or max(moved.values()) > 1:
-        raise ValueError("two links have one name, or two joints move one link")
+    names = [_name(element) for element in robot.findall(f"{joints[0].namespace}link")]
+    _refuse_repeated("links are called {}", names)
     behind: dict[str, list[str]] = {name: [] for name in names}
     for joint in joints:
         for end in (joint.parent, joint.child):
-            if end not in names:
+            if end not in behind:
                 raise ValueError(f"joint {joint.name} names {end[:80]!r}, which is no link")
         behind[joint.parent].append(joint.child)
+    _refuse_repeated("joints move one link, {}", [joint.child for joint in joints])
+    moved = {joint.child for joint in joints}
     reached = [name for name in behind if name not in moved]
     if len(reached) != 1:
         raise ValueError(f"{len(reached)} links hang from no joint instead of one")
