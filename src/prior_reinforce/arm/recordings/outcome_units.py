@@ -15,10 +15,10 @@ from prior_reinforce.arm.recordings.units import (
     is_possible,
     judge_unit,
     known_unit,
-    listed,
 )
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.units import base_of, factor, kind_of, looks_like, units_of
+from prior_reinforce.wording import listed
 
 _FAR, _FEW = 10.0, 3
 """Times as far as all others that an outcome is in another unit, and outcomes of which it is not

@@ -18,18 +18,13 @@ from prior_reinforce.arm.recordings.channels import Kind
 from prior_reinforce.arm.recordings.judging import Belief
 from prior_reinforce.arm.recordings.preprocessing import at_rests
 from prior_reinforce.arm.recordings.recording import Recording
-from prior_reinforce.arm.recordings.units import (
-    Ambiguity,
-    judge_unit,
-    known_unit,
-    listed,
-    say_names,
-)
+from prior_reinforce.arm.recordings.units import Ambiguity, judge_unit, known_unit, say_names
 from prior_reinforce.arrays import Plans
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.plans.speeds import largest_of_unit
 from prior_reinforce.plans.whole_turns import TURN
 from prior_reinforce.units import base_of, factor, spelt, without_number
+from prior_reinforce.wording import listed
 
 APART: Mapping[str, Sequence[float]] = {"rad": (TURN["deg"] / TURN["rad"],), "m": (100.0, 1000.0)}
 """How many times larger numbers get by the next unit: rad to deg, m to cm and mm."""

@@ -20,7 +20,6 @@ from jaxtyping import Float, Int
 from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.selection import Selection
 from prior_reinforce.arm.recordings.takes import so_far
-from prior_reinforce.arm.recordings.units import listed
 from prior_reinforce.arm.robots.limits import RobotLimits, joint_of, with_turns
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.motions import Demonstrations
@@ -33,6 +32,7 @@ from prior_reinforce.plans.whole_turns import (
     other_form,
 )
 from prior_reinforce.units import without_number
+from prior_reinforce.wording import listed
 
 Channel = Float[np.ndarray, " T"]
 """An angle at T frames."""

@@ -72,13 +72,14 @@ def read_urdf(
         for link in {tip, base} - {None, *links}:
             few = ", ".join(links[:_MOST_NAMED])
             raise ConfigurationError(f"it has no link {link!r}; it has {few}")
-        tip = _flange(links, moving, base, hold, meshes) if unsaid else tip
+        tip = _flange(links, moving, base, hold, meshes) if tip is None else tip
         chain = _path(tip, moving, base)
         if base is not None and (not chain or chain[0].parent != base):
             raise ConfigurationError(f"link {base} is not on the way to {tip}; say another --base")
         turning = [joint for joint in chain if joint.name not in hold and joint.type in TURNING]
         _refuse_other(chain, turning, tip, hold)
         velocity, acceleration, jerk = (_largest(key, turning) for key in LARGEST)
+        assert velocity is not None  # it is needed
         lower, upper = np.array([joint.range() for joint in turning]).T
         upright = _upright(_path(chain[0].parent, moving), hold)
         kinematics = _chain(chain, hold, upright)
