@@ -68,6 +68,7 @@ def afternoon(world: World, shown: Demonstrations) -> list[list[tuple[float, boo
         for _ in range(TRIALS):
             condition = adapter.propose(goal)
             expected = adapter.expect(condition, goal, TOLERANCE)
+            assert expected.p_hit is not None
             outcome = world.outcome(condition)
             hit = bool(np.linalg.norm((outcome - goal) / TOLERANCE) <= 1.0)
             said[-1].append((expected.p_hit, hit))
