@@ -46,6 +46,12 @@ def test_pieces_belong_together_and_specks_do_not():
     assert find_by_colour(table(((280, 5, 283, 8), RED)), "the red hoop") is None
 
 
+@pytest.mark.parametrize("words", ["Orange ball", "the ORANGE one"])
+def test_a_colour_may_begin_a_sentence(words):
+    box = (200, 150, 215, 170)
+    assert find_by_colour(table((box, ORANGE)), words) == box
+
+
 @pytest.mark.parametrize("words", ["the ball", "the red and blue ball", "the redder ball"])
 def test_words_must_name_one_colour(words):
     with pytest.raises(ConfigurationError, match="it must name one of red, orange, blue, yellow"):

@@ -128,7 +128,7 @@ def find_by_colour(picture: Picture, words: str) -> Box | None:
     from PIL import Image
     from scipy import ndimage
 
-    named = [colour for colour in COLOURS if re.search(rf"\b{colour}\b", words)]
+    named = [colour for colour in COLOURS if re.search(rf"\b{colour}\b", words, re.IGNORECASE)]
     if len(named) != 1:
         raise ConfigurationError(
             f"{words!r} names {len(named)} colours; to be found by colour it must name one of "
