@@ -18,6 +18,7 @@ import inspect
 import operator
 import os
 import pkgutil
+import re
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, is_dataclass
@@ -214,11 +215,15 @@ def build(config: type[Any], settings: Mapping[str, Any], choice: str = "") -> A
     """
     import msgspec
 
+    from prior_reinforce.settings import one_of
+
     choice = choice or config.__name__
     try:
         return msgspec.convert(_plain(config, settings, choice), config, strict=False)
     except msgspec.ValidationError as error:
-        raise ConfigurationError(f"{choice}: {error}") from error
+        named = re.search(r"`\$\.(\w+)`$", str(error))
+        remedy = one_of(typing.get_type_hints(config)[named[1]]) if named else ""
+        raise ConfigurationError(f"{choice}: {error}{remedy}") from error
 
 
 def _arguments(kind: type[Any], settings: Mapping[str, Any], choice: str) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from prior_reinforce.environment import Rollout
 from prior_reinforce.errors import ConfigurationError, EndpointError
 from prior_reinforce.perception.vlm_client import OpenAIClient, VisionLanguageModelConfig
 from tests.perception.slanted_table import BALL, GOAL
-from tests.perception.vision_server import VisionServer
+from tests.perception.vision_server import VisionServer, vlm_file
 
 RNG = np.random.default_rng(0)
 
@@ -317,6 +317,8 @@ def refused(address, **settings):
     [
         (b"429 No", "You exceeded your current quota, please check your plan", "quota"),
         (b"402 Pay", "Insufficient balance", "log"),
+        (b"403 No", "Your country is not supported", "what the key may do"),
+        (b"413 Big", "Request entity too large", "lower max_image_side"),
         (b"401 No", "Incorrect API key provided", "api_key_variable"),
         (b"404 No", "The model `x` has been deprecated", "base_url and model"),
         (b"400 Bad", "Unsupported parameter: 'max_tokens'", "leave_out = ['max_tokens']"),
@@ -338,6 +340,25 @@ def test_a_refusal_has_the_servers_own_words_and_a_remedy(status, words, remedy,
         said = refused(address)
     assert words[:60] in said
     assert remedy in said
+
+
+def test_a_server_that_asks_for_an_hour_is_asked_once_and_the_hour_is_said():
+    content = body({"error": {"message": "slow down"}}, Retry_After="3600")
+    content = content.replace(b"200 OK", b"429 No")
+    with endpoint(lambda file: file.write(content)) as (address, requests):
+        said = refused(address, max_retries=2)
+    assert len(requests) == 1
+    assert "3600 s" in said
+    assert "3 tries" not in said
+
+
+def test_a_family_that_is_unknown_in_a_file_is_told_with_those_that_are_known(tmp_path):
+    path = vlm_file(tmp_path, "http://127.0.0.1:8000/v1", family="llava")
+    with pytest.raises(ConfigurationError, match=r"'llava'.*use one of glm-4\.5v, qwen2-vl, "):
+        VisionLanguageModelConfig.load(path)
+    path = vlm_file(tmp_path, "http://127.0.0.1:8000/v1", server="ollama")
+    with pytest.raises(ConfigurationError, match=r"'ollama'.*use one of vllm, zai, plain"):
+        VisionLanguageModelConfig.load(path)
 
 
 def test_fields_that_a_server_refuses_are_left_out():

@@ -287,7 +287,10 @@ class OpenAIClient:
         import openai
 
         config = self.config
-        url, tries = without_secrets(config.base_url), f"after {config.max_retries + 1} tries"
+        headers = getattr(getattr(error, "request", None), "headers", {})
+        n_tries = 1 + int(headers.get("x-stainless-retry-count", config.max_retries))
+        url = without_secrets(config.base_url)
+        tries = "after one try" if n_tries == 1 else f"after {n_tries} tries"
         said, refused = self._words_of(error, content)
         if isinstance(error, openai.APITimeoutError):
             return f"no answer from {url} in {config.timeout:g} s {tries}; raise timeout"
@@ -311,9 +314,16 @@ class OpenAIClient:
         what, remedy = f"failed with HTTP {error.status_code}", "see the server's log"
         if error.status_code == 429:
             what = f"refuses more requests for now (HTTP 429) {tries}"
-            remedy = "wait a minute, or see to the account's quota"
+            wait = error.response.headers.get("Retry-After", "")
+            asked = f"{wait} s, as it asks" if wait.isdecimal() else "a minute"
+            remedy = f"wait {asked}, or see to the account's quota"
         elif error.status_code == 401:
             what, remedy = "refuses the key (HTTP 401)", "set api_key_variable"
+        elif error.status_code == 403:
+            what = "refuses the request (HTTP 403)"
+            remedy = "see to what the key may do, and in which country"
+        elif error.status_code == 413:
+            what, remedy = "finds the picture too large (HTTP 413)", "lower max_image_side"
         elif error.status_code == 404:
             what = f"does not serve model '{config.model}' (HTTP 404)"
             remedy = "set base_url and model"
