@@ -47,6 +47,8 @@ class SeenObject:
     size: float
     """Longer side of a box around it, in [m]. A box of less than half of it, or more than twice,
     is not around this object, however often the model repeats it."""
+    round: bool = True
+    """Whether it looks as wide from all sides, so that a flatter box is around a part of it."""
 
     def __post_init__(self) -> None:
         if not (self.words.strip() and self.words.isprintable() and self.size > 0):

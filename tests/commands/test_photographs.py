@@ -490,13 +490,18 @@ def test_four_points_tell_no_spread(drawn_table, capsys, run):
     assert "too few to tell how well it fits: +-0.3 cm is without" in capsys.readouterr().err
 
 
-def test_a_goal_that_is_seen_far_from_the_one_that_is_set_is_no_reading(drawn_table, capsys):
-    with Workspace.create(drawn_table / "hoop", manifest()) as workspace:
+def trial_for(goal, folder):
+    """A workspace that waits for the outcome of its first trial for a goal."""
+    with Workspace.create(folder / "hoop", manifest()) as workspace:
         workspace.import_demonstrations(demonstrations(), "made up")
         workspace.learn("interpolation")
-        workspace.set_goal([0.8, 0.05])
+        workspace.set_goal(goal)
         workspace.session().ask()
-    of_trial = ("--workspace", str(drawn_table / "hoop"), "--trial", "1")
+    return "--workspace", str(folder / "hoop"), "--trial", "1"
+
+
+def test_a_goal_that_is_seen_far_from_the_one_that_is_set_is_no_reading(drawn_table, capsys):
+    of_trial = trial_for([0.8, 0.05], drawn_table)
     with VisionServer() as server:
         assert look(drawn_table, server.base_url, *of_trial) == 1
     said = capsys.readouterr()
@@ -512,14 +517,9 @@ def test_a_goal_that_is_seen_far_from_the_one_that_is_set_is_no_reading(drawn_ta
     ],
 )
 def test_a_picture_that_is_turned_or_mirrored_is_no_reading(drawn_table, capsys, flip, goal, how):
-    with Workspace.create(drawn_table / "hoop", manifest()) as workspace:
-        workspace.import_demonstrations(demonstrations(), "made up")
-        workspace.learn("interpolation")
-        workspace.set_goal(goal)
-        workspace.session().ask()
     drawn(drawn_table / "photo.png", hoop=goal)
     Image.open(drawn_table / "photo.png").transpose(flip).save(drawn_table / "photo.png")
-    of_trial = ("--workspace", str(drawn_table / "hoop"), "--trial", "1")
+    of_trial = trial_for(goal, drawn_table)
     with VisionServer() as server:
         assert look(drawn_table, server.base_url, *of_trial) == 1
     said = capsys.readouterr()
@@ -527,15 +527,62 @@ def test_a_picture_that_is_turned_or_mirrored_is_no_reading(drawn_table, capsys,
     assert "tell" not in said.out
 
 
+def test_a_goal_that_is_seen_a_little_beside_makes_what_is_told_as_unsure(drawn_table, capsys):
+    of_trial = trial_for([0.96, 0.05], drawn_table)
+    with VisionServer() as server:
+        assert look(drawn_table, server.base_url, *of_trial) == 0
+    said = capsys.readouterr()
+    assert "4.0 cm from the goal that is set" in said.err
+    x, sd, y = seen(said.out)
+    np.testing.assert_allclose([x, y, sd], [0.09, 0.07, 0.04], atol=0.004)
+    assert said.out.rstrip().endswith("+-0.003")  # to the side it is seen where it is set
+
+
+def cut_in_shape(path, times):
+    """A picture's middle in the same shape, so many times as large."""
+    image = Image.open(path)
+    wide, tall = (round(side / times) for side in image.size)
+    left, top = 600 - wide // 4, 300 - tall // 4
+    image.crop((left, top, left + wide, top + tall)).save(path)
+
+
+@pytest.mark.parametrize("times", [1.1, 1.15])
+def test_a_picture_that_is_cut_in_the_same_shape_is_no_sure_reading(drawn_table, capsys, times):
+    cut_in_shape(drawn_table / "photo.png", times)
+    with VisionServer() as server:
+        assert look(drawn_table, server.base_url) == 0
+        said = capsys.readouterr()
+        assert "if it was cut instead" in said.err
+        x, sd, y = seen(said.out)
+        assert np.abs([x - 0.05, y - 0.07]).max() <= max(0.006, 1.5 * sd)
+        assert look(drawn_table, server.base_url, *trial_for([1.0, 0.05], drawn_table)) == 1
+    said = capsys.readouterr()
+    assert "from the goal that is set" in said.err
+    assert "tell" not in said.out
+
+
+def test_an_object_that_the_border_cuts_is_told(drawn_table, capsys):
+    drawn(drawn_table / "photo.png", ball=(0.9, 1.28))
+    with VisionServer() as server:
+        assert look(drawn_table, server.base_url) == 0
+    said = capsys.readouterr()
+    assert "the orange ball is cut" in said.err
+    assert said.out.rstrip().endswith("+-0.015")
+
+
+def test_a_calibration_that_is_none_names_the_command_that_writes_one(drawn_table, run):
+    for name in ("points.csv", "nothing.json"):
+        objects = ("--reached", "the ball", "--reached-size", "0.06", "--goal", "the hoop")
+        given = (*objects, "--goal-size", "0.1", "--calibration", drawn_table / name)
+        status, _, err = run("look", drawn_table / "photo.png", *given)
+        assert status == 2
+        assert "`calibrate`" in err
+
+
 def test_which_model_looks_may_stand_in_the_workspaces_manifest(drawn_table, capsys):
-    with Workspace.create(drawn_table / "hoop", manifest()) as workspace:
-        workspace.import_demonstrations(demonstrations(), "made up")
-        workspace.learn("interpolation")
-        workspace.set_goal([1.0, 0.05])
-        workspace.session().ask()
     objects = ["--reached", "the orange ball", "--reached-size", "0.06", "--goal", "the red hoop"]
     objects += ["--goal-size", "0.1", "--calibration", str(drawn_table / "table.json")]
-    where = ["--workspace", str(drawn_table / "hoop"), "--trial", "1"]
+    where = trial_for([1.0, 0.05], drawn_table)
     with VisionServer("gemini") as server:
         section = f'\n[vlm]\nbase_url = "{server.base_url}"\nfamily = "gemini"\n'
         with (drawn_table / "hoop" / "workspace.toml").open("a") as file:

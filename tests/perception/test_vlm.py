@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageDraw
 
-from prior_reinforce.environment import Rollout, TableScene
+from prior_reinforce.environment import Rollout, SeenObject, TableScene
 from prior_reinforce.errors import ConfigurationError, EndpointError, PerceptionFailedError
-from prior_reinforce.perception.calibration import TableCalibration
+from prior_reinforce.perception.calibration import CAMERA_SD, TableCalibration
 from prior_reinforce.perception.camera import Camera, CameraConfig
 from prior_reinforce.perception.colour_camera import ColourClient, find_by_colour, say_box
 from prior_reinforce.perception.vlm import VisionLanguageModel
@@ -410,3 +410,93 @@ def test_what_a_camera_tells_is_no_surer_than_its_calibration(calibration, frame
         frame = frame_with_ball_at(*BALL)
         reading = perception.perceive(Rollout(BALL, True, frame), GOAL, RNG)
     np.testing.assert_allclose(reading.sd, 0.14)
+
+
+@pytest.fixture(scope="module")
+def flat():
+    """A camera straight above (1, 0), 500 px a metre, in pictures of 1000 x 800 px."""
+    grid = np.array([(x, y) for x in (0.6, 1.4) for y in (-0.6, 0.0, 0.6)])
+    return TableCalibration.fit(grid, _flat_pixels(grid), picture=(1000, 800))
+
+
+def _flat_pixels(places):
+    return np.array([500, 400]) - 500 * (np.asarray(places)[..., ::-1] - [0, 1])
+
+
+def painted(*discs, hidden=None):
+    """Orange discs (x, y, radius), and what hides them: a rectangle (left, top, right, bottom)."""
+    image = Image.new("RGB", (1000, 800), (204, 178, 143))
+    pen = ImageDraw.Draw(image)
+    for x, y, radius in discs:
+        pen.circle(_flat_pixels([x, y]).tolist(), 500 * radius, fill=(245, 128, 25))
+    if hidden is not None:
+        pen.rectangle(hidden, fill=(204, 178, 143))
+    return np.asarray(image)
+
+
+def found_by_colour(picture, calibration, size, *, is_round=True):
+    wanted = SeenObject("the orange ball", size, is_round)
+    scene = TableScene(wanted, wanted, plane_height=0.0)
+    with VisionLanguageModel(scene, client=ColourClient(), calibration=calibration) as eye:
+        return eye.find(wanted, picture)
+
+
+@pytest.mark.parametrize(
+    ("place", "radius", "others", "hidden"),
+    [
+        ((1.0, 1.0), 0.03, (), None),  # half of it beyond the left border
+        ((1.0, 0.992), 0.03, (), None),
+        ((0.2, 0.0), 0.03, (), None),  # beyond the lower one
+        ((1.0, 0.0), 0.03, (), (500, 0, 999, 799)),  # its right half is hidden
+        ((1.0, 0.0), 0.10, (), (0, 0, 999, 400)),  # the upper half
+        ((1.0, 0.0), 0.03, ((1.0, 0.045, 0.017),), None),  # another thing of its colour beside it
+        ((1.0, 0.0), 0.03, ((1.035, 0.035, 0.017),), None),
+    ],
+)
+def test_the_place_of_a_part_of_an_object_is_no_surer_than_it_is_right(
+    place, radius, others, hidden, flat
+):
+    picture = painted((*place, radius), *others, hidden=hidden)
+    seen = found_by_colour(picture, flat, 2 * radius)
+    if seen.place is not None:
+        wrong = np.abs(seen.place - place)
+        assert wrong.max() > 2 * CAMERA_SD
+        assert (wrong <= 1.3 * flat.sd_off(seen.off)).all()
+
+
+@pytest.mark.parametrize("place", [(1.0, 0.0), (1.0, 0.969), (0.231, 0.0), (1.3, -0.5)])
+@pytest.mark.parametrize("radius", [0.03, 0.1])
+def test_a_whole_object_is_as_sure_as_the_calibration(place, radius, flat):
+    place = np.array(place) + np.sign([1 - place[0], -place[1]]) * (radius - 0.03)
+    seen = found_by_colour(painted((*place, radius)), flat, 2 * radius)
+    np.testing.assert_allclose(seen.place, place, atol=0.003)
+    np.testing.assert_array_equal(flat.sd_off(seen.off), flat.sd)
+
+
+def test_a_flat_box_around_what_is_not_round_hides_nothing(flat):
+    picture = painted((1.0, 0.0, 0.1), hidden=(0, 0, 999, 390)).copy()
+    picture[410:] = picture[0, 0]
+    assert flat.sd_off(found_by_colour(picture, flat, 0.2).off).max() > 0.05
+    oblong = found_by_colour(picture, flat, 0.2, is_round=False)
+    np.testing.assert_array_equal(flat.sd_off(oblong.off), flat.sd)
+
+
+@pytest.mark.parametrize("shrunk", [0.95, 0.9, 0.85])
+def test_a_distance_in_a_picture_that_is_shrunk_a_little_is_no_surer_than_it_is_right(shrunk, flat):
+    ball, hoop = np.array([0.95, 0.12]), np.array([1.0, 0.05])
+
+    class Shrinks(ColourClient):
+        def ask(self, words, picture):
+            place, radius = (ball, 0.03) if "ball" in words else (hoop, 0.1)
+            box = shrunk * np.add.outer([-500 * radius, 500 * radius], _flat_pixels(place))
+            return Answer(json.dumps({"bbox_2d": box.round().ravel().tolist()}), None, "stop")
+
+    scene = TableScene(SeenObject("the ball", 0.06), SeenObject("the hoop", 0.2), 0.0)
+    how = VisionLanguageModelConfig(family="qwen2.5-vl", max_image_side=1008)
+    with VisionLanguageModel(scene, how, client=Shrinks(), calibration=flat) as eye:
+        reading = eye.read(painted())
+    if reading.error_seen is not None:
+        wrong = np.abs(reading.error_seen - (ball - hoop))
+        assert (wrong <= 1.5 * reading.sd).all()
+        told_on_980_px = shrunk * 1000 / 980
+        assert shrunk > 0.9 or reading.scale == pytest.approx(told_on_980_px, abs=0.03)

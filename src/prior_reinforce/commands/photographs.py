@@ -43,13 +43,11 @@ _UPSIDE_DOWN = ({1, 3}, {6, 8})
 """EXIF orientations half a turn apart, which a telephone that lies flat mixes up."""
 _EXPOSURE = 10
 """Frames, of which the last is kept; ours: the first are dark until a webcam has set itself."""
-_SAME_GOAL, _OTHER_GOAL = 0.02, 0.15
+_SAME_GOAL, _OTHER_GOAL = 0.02, 0.06
 """By how far what stands at the goal may be seen from it, in [m], without a warning; from where on
 the picture or its reading is another one than is thought. Ours: twice a camera's error, and
-farther than anybody misplaces a hoop."""
-_FLIPPED = 3 * _SAME_GOAL
-"""From how far beside the goal, in [m], a picture may be turned or mirrored; ours: nearer, a hoop
-may be misplaced beside the picture's middle."""
+farther than anybody misplaces a hoop who measures. Between them, nobody knows whether the hoop or
+the calibration is off, so what is told is no surer than that."""
 
 
 @dataclass(frozen=True)
@@ -146,6 +144,10 @@ class Look:
     """What stands at the goal: "the red hoop"."""
     goal_size: float
     """Longer side of a box around it, in [m]."""
+    reached_round: bool = True
+    """Whether what flew looks as wide from all sides: a flatter box then shows a part of it."""
+    goal_round: bool = True
+    """The same of what stands at the goal."""
     goal_offset: tuple[float, float] = (0.0, 0.0)
     """From that object's centre to the goal, forward and left, in [m]."""
     camera: str | None = None
@@ -175,8 +177,8 @@ class Look:
         refuse_foreign(drawn if not written.exists() else written, "picture_size_px")
         calibration = TableCalibration.load(self.calibration)
         scene = TableScene(
-            SeenObject(self.reached, self.reached_size),
-            SeenObject(self.goal, self.goal_size),
+            SeenObject(self.reached, self.reached_size, self.reached_round),
+            SeenObject(self.goal, self.goal_size, self.goal_round),
             plane_height=calibration.height,
             goal_offset=self.goal_offset,
         )
@@ -196,7 +198,10 @@ class Look:
                 f"+-{100 * here.sd:.1f} cm is without a wrong point; give one point more"
             )
         if here is not calibration:
-            warn("the picture has another size than that of the calibration, and is scaled to it")
+            warn(
+                "the picture has another size than that of the calibration, and is scaled to it; "
+                "if it was cut instead, all places are wrong: take it as before"
+            )
         with VisionLanguageModel(scene, model_of(self.vlm, around), calibration=here) as model:
             reading = model.read(picture)
         if reading.unanswered:
@@ -204,45 +209,54 @@ class Look:
         with named_disk_errors(folder):
             folder.mkdir(exist_ok=True)
             reading.save(folder, stem)
-        if reading.error_seen is None:
+        error, sd = reading.error_seen, reading.sd
+        if error is None or sd is None:
             raise _refused(f"{reading.problem}; look at {drawn} and tell what you see yourself")
         for sighting in filter(None, (reading.reached, reading.goal)):
             _warn_if_beyond(here, sighting)
-        error = reading.error_seen
+            _warn_if_in_part(here, sighting)
+        if reading.scale != 1:
+            warn(
+                f"both objects look {reading.scale:.2f} times as large as they are: is the picture "
+                "cut, does the server shrink pictures (then set max_image_side), are the sizes "
+                "right?"
+            )
         if goal is not None and reading.reached.place is not None:
             error = reading.reached.place - goal
-            self._check_goal(here, reading, goal, drawn)
+            sd = np.maximum(sd, here.sd_off(self._beside_goal(here, reading, goal, drawn)))
         print(f"seen: {to_words(error)}   boxes: {drawn}")
-        numbers = " ".join(f"{component:.4f}+-{here.sd:.2g}" for component in error)
+        numbers = " ".join(f"{e:.4f}+-{s:.2g}" for e, s in zip(error, sd, strict=True))
         told = "FOLDER TRIAL" if goal is None else f"{shlex.quote(str(folder.parent))} {self.trial}"
         print(f"if the boxes are right: prior-reinforce tell {told} {numbers}")
 
-    def _check_goal(
+    def _beside_goal(
         self, here: TableCalibration, reading: PictureReading, goal: Point, drawn: Path
-    ) -> None:
-        """Refuse a picture, or warn of it, in which the goal's object is seen beside the goal."""
+    ) -> Float[np.ndarray, "2"]:
+        """How far beside the goal its object is seen, in [m]; far is refused, less warned of."""
         assert reading.goal is not None
         assert reading.goal.place is not None
         assert reading.goal_place is not None
-        moved = float(np.linalg.norm(reading.goal_place - goal))
+        beside = reading.goal_place - goal
+        moved = float(np.linalg.norm(beside))
         says = f"{self.goal} is seen {100 * moved:.1f} cm from the goal that is set; "
-        if moved > max(_OTHER_GOAL, 3 * here.sd):
-            raise _refused(
-                f"{says}is this the picture, the calibration and the model family that you think? "
-                f"look at {drawn}"
-            )
         (u, v), (tall, wide) = here.to_pixels(reading.goal.place), reading.picture.shape[:2]
         flips = {"turned by half a turn": (wide - u, tall - v), "mirrored": (wide - u, v)}
         offset = reading.goal_place - reading.goal.place - goal
         offs = {how: here.to_table(np.array(at)) + offset for how, at in flips.items()}
         off, how = min((float(np.linalg.norm(off)), how) for how, off in offs.items())
-        if moved > _FLIPPED and off <= min(max(_SAME_GOAL, 3 * here.sd), moved / 3):
+        if moved > _OTHER_GOAL and off <= min(max(_SAME_GOAL, 3 * here.sd), moved / 3):
             raise _refused(
                 f"{says}in the picture {how} it would be seen {100 * off:.1f} cm from it: is the "
                 "photograph as the camera took it when it was calibrated?"
             )
+        if moved > max(_OTHER_GOAL, 3 * here.sd):
+            raise _refused(
+                f"{says}is this the picture (whole), the calibration and the model family that you "
+                f"think? look at {drawn}"
+            )
         if moved > _SAME_GOAL:
             warn(f"{says}check the calibration, or move it there")
+        return beside
 
     def _of_trial(self) -> tuple[Point | None, Path, str]:
         """The goal that the trial was for, where to keep what is seen, and its name there."""
@@ -287,6 +301,16 @@ def _warn_if_beyond(calibration: TableCalibration, sighting: Sighting) -> None:
             f"{sighting.words} is seen {100 * beyond:.0f} cm beyond the calibrated points, which "
             f"are {100 * across:.0f} cm apart: there nothing tells how far off its place is; "
             "calibrate with points all around"
+        )
+
+
+def _warn_if_in_part(calibration: TableCalibration, sighting: Sighting) -> None:
+    """Warn of an object whose box is not around it alone and as a whole."""
+    if (calibration.sd_off(sighting.off) > calibration.sd).any():
+        warn(
+            f"{sighting.words} is cut by the picture's border, half hidden, or in one box with "
+            f"something else: its middle may be {100 * np.linalg.norm(sighting.off):.1f} cm off; "
+            "show all of it (or say --no-reached-round, --no-goal-round of what is not round)"
         )
 
 

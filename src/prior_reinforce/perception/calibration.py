@@ -113,6 +113,13 @@ class TableCalibration:
         """Standard deviation of each component of a place, in [m]: the largest that is known."""
         return max(CAMERA_SD, self.fit_error, self.left_out_error or 0.0, self.worst_sd)
 
+    def sd_off(self, off: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
+        """Return the standard deviation of a place that may be so far off besides, in [m].
+
+        Up to twice `sd` that says enough (ours: what hides a part of an object is in `CAMERA_SD`).
+        """
+        return np.where(np.abs(off) > 2 * self.sd, np.abs(off), self.sd)
+
     @classmethod
     def fit(
         cls,
@@ -305,7 +312,8 @@ class TableCalibration:
             np.linalg.inv(saved.homography)
         except (OSError, ValueError, np.linalg.LinAlgError) as error:
             raise FileFormatError(
-                f"{path} is not a table calibration ({error}); write one with TableCalibration.save"
+                f"{path} is not a table calibration ({error}); write one with `calibrate`, or with "
+                "TableCalibration.save"
             ) from error
         own = msgspec.structs.asdict(saved) | {"homography": np.array(saved.homography)}
         del own["kind"]

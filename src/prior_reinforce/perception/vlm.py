@@ -39,6 +39,9 @@ the true box where nothing hides it."""
 _LOOSE = 1.3
 """Up to what factor a box's side fits an object (ours): models draw boxes 20 to 30 % too large or
 small."""
+_DRAWN = 3
+"""By how many of its steps a side may differ from an object's by chance (ours): one at each end,
+and a blurred edge."""
 
 
 class VisionLanguageModel(Perception):
@@ -113,8 +116,8 @@ class VisionLanguageModel(Perception):
         if reading.error_seen is None:
             kind = EndpointError if reading.unanswered else PerceptionFailedError
             raise kind(f"{reading.problem}; ask the operator for the error")
-        assert self._calibration is not None
-        return Reading.measured(reading.error_seen, self._calibration.sd)
+        assert reading.sd is not None
+        return Reading.measured(reading.error_seen, reading.sd)
 
     def read(self, picture: Picture) -> PictureReading:
         """Read the error from any picture of the calibrated camera, a photograph for instance.
@@ -125,7 +128,8 @@ class VisionLanguageModel(Perception):
         Raises:
             ConfigurationError: There is no calibration.
         """
-        goal = goal_place = goal_pixel = None
+        goal = goal_place = goal_pixel = sd = None
+        scale = 1.0
         reached = self.find(self.scene.reached, picture)
         if reached.problem is None:
             goal = self.find(self.scene.goal, picture)
@@ -135,8 +139,12 @@ class VisionLanguageModel(Perception):
                 goal_place = goal.place + np.array(self.scene.goal_offset)
                 x, y = self._in(picture).to_pixels(goal_place).tolist()
                 goal_pixel = (x, y)
+                scale = self._scale(reached, goal, picture)
+                stretched = (reached.place - goal_place) * (1 / scale - 1)
+                of_boxes = self._in(picture).sd_off(np.hypot(reached.off, goal.off))
+                sd = np.hypot(of_boxes, stretched)
         self.last_reading = PictureReading(
-            picture, self._client.model, reached, goal, goal_place, goal_pixel
+            picture, self._client.model, reached, goal, goal_place, goal_pixel, scale, sd
         )
         return self.last_reading
 
@@ -208,6 +216,19 @@ class VisionLanguageModel(Perception):
             "are the sizes right?"
         )
 
+    def _scale(self, reached: Sighting, goal: Sighting, picture: Picture) -> float:
+        """How many times as large as they are both objects look; 1 where that may be chance."""
+        assert reached.box is not None
+        assert goal.box is not None
+        found = [(reached.box, self.scene.reached.size), (goal.box, self.scene.goal.size)]
+        seen = [_sides(box, self._in(picture), size) for box, size in found]
+        scales = [np.clip(1, (of / ball).min(), (of / disc).max()) for of, disc, ball in seen]
+        chance = [_DRAWN * _step(picture) / ball for _, _, ball in seen]
+        surest = int(np.argmin(chance))
+        if abs(scales[0] - scales[1]) > sum(chance) or abs(scales[surest] - 1) <= chance[surest]:
+            return 1.0
+        return float(scales[surest])
+
     def _swapped(self, box: Box, wide: float) -> Box:
         """The box of the same numbers with x and y swapped, in a picture so many times as wide."""
         left, top, right, bottom = box
@@ -250,7 +271,8 @@ class VisionLanguageModel(Perception):
             box = _agreed(boxes, calibration, self.config.spread_gate)
             if len(boxes) >= votes and box is not None:
                 place = calibration.to_table(_centres(np.array([box])))[0]
-                return Sighting(words, tuple(answers), box, place)
+                off = _off(box, calibration, wanted, picture)
+                return Sighting(words, tuple(answers), box, place, off)
         if len(boxes) >= votes:
             gate_cm = 100 * self.config.spread_gate
             why = f"{len(boxes)} answers do not agree on a place to {gate_cm:g} cm"
@@ -330,6 +352,28 @@ def _sides(
     left, top, right, bottom = box
     middle = np.array([(left + right) / 2, (top + bottom) / 2])
     return np.array([right - left, bottom - top]), *calibration.seen(middle, size)
+
+
+def _off(
+    box: Box, calibration: TableCalibration, wanted: SeenObject, picture: Picture
+) -> Float[np.ndarray, "2"]:
+    """How far an object's middle may be beside its box's, in [m]: half of what the sides are off.
+
+    A side at the picture's border lacks what is cut, one that is shorter than the other (where the
+    object is round) what is hidden; one that is too long is around something else, too.
+    """
+    sides, disc, ball = _sides(box, calibration, wanted.size)
+    ends, border = np.reshape(box, (2, 2)), np.array(picture.shape[1::-1]) - _step(picture)
+    cut = (ends[0] <= _step(picture)) | (ends[1] >= border)
+    round_one = min((sides / disc).max(), 1.0) * disc if wanted.round else 0 * disc
+    half = np.maximum(np.where(cut, disc, round_one) - sides, sides - ball).clip(0) / 2
+    places = calibration.to_table(ends.mean(axis=0) + np.vstack([[0, 0], np.diag(half)]))
+    return np.abs(places[1:] - places[0]).sum(axis=0)
+
+
+def _step(picture: Picture) -> float:
+    """What a box is at least rounded to, in [px]: thousandths of the longer side, or pixels."""
+    return max(1.0, max(picture.shape) / 1000)
 
 
 def _fits_better(swapped: list[float], read: list[float]) -> bool:

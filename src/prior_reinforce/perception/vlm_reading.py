@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import json
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,6 +56,8 @@ class Sighting:
     """Median box of the answers that agree, in pixels of the picture."""
     place: Float[np.ndarray, "2"] | None = None
     """Centre of `box` on the calibrated plane, table frame, in [m]."""
+    off: Float[np.ndarray, "2"] = field(default_factory=lambda: np.zeros(2))
+    """How far `place` may be beside the object's middle, by the box's shape and size, in [m]."""
     problem: str | None = None
     """Why there is no place."""
     unanswered: bool = False
@@ -77,6 +79,10 @@ class PictureReading:
     """The goal, as far from its object's centre as the scene says, in [m]."""
     goal_pixel: tuple[float, float] | None = None
     """The goal in the picture."""
+    scale: float = 1.0
+    """How many times as large as they are both objects look; 1 where that may be chance."""
+    sd: Float[np.ndarray, "2"] | None = None
+    """Standard deviation of `error_seen`, in [m]."""
 
     @property
     def problem(self) -> str | None:
@@ -141,6 +147,7 @@ class PictureReading:
             "model": self.model,
             "picture_size_px": [self.picture.shape[1], self.picture.shape[0]],
             "error_seen_m": _listed(self.error_seen),
+            "sd_m": _listed(self.sd),
             "problem": self.problem,
             "reached": _sighting_record(self.reached),
             "goal": None if self.goal is None else _sighting_record(self.goal),

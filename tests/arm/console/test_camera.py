@@ -131,6 +131,9 @@ def test_the_ball_is_found_by_its_colour(pictures):
     calibrated(pictures)
     found = pictures.find(Look("the orange ball", 0.04))
     np.testing.assert_allclose(found.place, [0.93, 0.07], atol=0.003)
+    assert found.sd == pictures.look_up().sd
+    # What is 2.4 cm wide is somewhere in a box of 3.8 cm.
+    assert pictures.find(Look("the orange ball", 0.024)).sd == pytest.approx(0.007, abs=0.001)
     left, top, right, bottom = found.box
     u, v = pixel([0.93, 0.07])
     assert left < u < right

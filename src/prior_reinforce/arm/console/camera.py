@@ -75,6 +75,8 @@ class Found(Struct):
     """Left, top, right, bottom, in [px]."""
     place: list[float]
     """What its centre stands on, (x, y) in [m]."""
+    sd: float
+    """Of each component of the place, in [m]: larger where the box shows a part of the object."""
 
 
 class Pictures:
@@ -167,7 +169,8 @@ class Pictures:
             sighting = model.find(wanted, read_picture(self.file()))
         if sighting.box is None or sighting.place is None:
             raise PerceptionFailedError(f"{sighting.problem}; touch it in the picture")
-        return Found([*sighting.box], sighting.place.tolist())
+        sd = calibration.sd_off(sighting.off).max()
+        return Found([*sighting.box], sighting.place.tolist(), float(sd))
 
     def _calibration(self) -> TableCalibration | None:
         path = require_inside(self._verbs.folder / "camera.json", self._verbs.folder)

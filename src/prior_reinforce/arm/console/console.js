@@ -1157,7 +1157,7 @@ async function find(by) {
   if (!found) return;
   box = found.box;
   L.view = "picture";
-  if (touching()) setMark(found.place, C.sd);
+  if (touching()) setMark(found.place, found.sd);
   else draw();
 }
 function drawCamera() {
