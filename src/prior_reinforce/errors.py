@@ -4,6 +4,8 @@ A message is one line that names the value, what was expected and the remedy; th
 prints it as it stands and exits with status 2, or 1 if something was written before it.
 """
 
+from typing import Any, Literal, get_args, get_origin
+
 
 class PriorReinforceError(Exception):
     """Base of all errors that this package raises on purpose."""
@@ -91,3 +93,10 @@ class RobotLimitError(PriorReinforceError, ValueError):
 
 class WorkspaceError(PriorReinforceError, RuntimeError):
     """A task folder on disk is missing, incomplete, locked, or inconsistent with its journal."""
+
+
+def one_of(hint: Any) -> str:
+    """The remedy for a value that is none of a `Literal`; empty for any other annotation."""
+    kinds = [kind for kind in (hint, *get_args(hint)) if get_origin(kind) is Literal]
+    values = [str(value) for kind in kinds for value in get_args(kind)]
+    return f"; use one of {', '.join(values)}" if values else ""

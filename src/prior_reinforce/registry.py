@@ -24,7 +24,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, is_dataclass
 from typing import Any, Generic, TypeVar, cast
 
-from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.errors import ConfigurationError, one_of
 from prior_reinforce.extras import missing_extra
 
 T = TypeVar("T")
@@ -214,8 +214,6 @@ def build(config: type[Any], settings: Mapping[str, Any], choice: str = "") -> A
         ConfigurationError: An unknown setting, or a value of a wrong type or out of range.
     """
     import msgspec
-
-    from prior_reinforce.settings import one_of
 
     choice = choice or config.__name__
     try:

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass, fields
-from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, get_type_hints
 
 import msgspec
 import numpy as np
 
-from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.errors import ConfigurationError, one_of
 
 if sys.version_info >= (3, 11):
     import tomllib as tomllib
@@ -50,13 +50,6 @@ class Checked:
             except msgspec.ValidationError as error:
                 said = f"{each.name}: {error}, got {plain!r}{one_of(hints[each.name])}"
                 raise ConfigurationError(said) from error
-
-
-def one_of(hint: Any) -> str:
-    """The remedy for a value that is none of a `Literal`; empty for any other annotation."""
-    kinds = [kind for kind in (hint, *get_args(hint)) if get_origin(kind) is Literal]
-    values = [str(value) for kind in kinds for value in get_args(kind)]
-    return f"; use one of {', '.join(values)}" if values else ""
 
 
 def _plain(value: Any) -> Any:
