@@ -293,3 +293,31 @@ def test_new_asks_again_after_a_slip_and_only_for_a_new_folder(run, tmp_path, mo
     assert "got 'carry'" in out
     assert 'object = "carried"' in (tmp_path / "w" / "workspace.toml").read_text()
     assert "exists and is not empty" in run("new", tmp_path / "w")[2]  # no answer is left to take
+
+
+@pytest.mark.parametrize(("unit", "tolerance"), [("m", 0.015), ("cm", 1.5), ("mm", 15.0)])
+def test_a_tolerance_that_is_not_said_is_a_centimetre_and_a_half_in_any_unit(
+    run, tmp_path, unit, tolerance
+):
+    assert run("new", tmp_path / "w", "--robot", "none", "--outcome-units", unit)[0] == 0
+    with Workspace(tmp_path / "w") as workspace:
+        assert workspace.manifest.outcome_format.tolerance == (tolerance, tolerance)
+
+
+def test_what_is_no_length_needs_a_tolerance_of_its_own(run, tmp_path):
+    new = ["new", tmp_path / "w", "--robot", "none", "--outcome-names", "spin"]
+    new += ["--outcome-units", "deg"]
+    status, _, err = run(*new)
+    assert status == 2
+    assert "--tolerance" in err
+    assert run(*new, "--tolerance", "5")[0] == 0
+
+
+@pytest.mark.parametrize("where", ["0.7 0", "carried", "anywhere"])
+def test_motions_are_moved_in_metres_and_outcomes_in_another_unit_refused(run, tmp_path, where):
+    columns = ["--robot", "none", "--action-names", "x", "y", "--action-units", "m"]
+    new = ["new", tmp_path / "w", *columns, "--symmetry", where]
+    status, _, err = run(*new, "--outcome-units", "cm")
+    assert status == 2
+    assert "write units m" in err
+    assert run(*new)[0] == 0

@@ -28,7 +28,7 @@ def body_without_end(file):
 def test_an_answer_that_trickles_is_waited_for_no_longer_than_the_timeout(reply):
     with (
         endpoint(reply) as (address, _),
-        pytest.raises(EndpointError, match=r"no answer from .* in 0.3 s after 1 tries"),
+        pytest.raises(EndpointError, match=r"no answer from .* in 0.3 s after one try"),
     ):
         ask(address, timeout=0.3)
 

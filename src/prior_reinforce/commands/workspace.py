@@ -59,7 +59,7 @@ class New(NewWorkspace):
             help=f"Whose limits hold: {', '.join(PRESETS)}, the path of a .urdf, or none."
         ),
     ] = "panda"
-    tolerance: tuple[float, ...] = (0.015,)
+    tolerance: tuple[float, ...] = ()
 
     def run(self) -> None:
         """Write the folder."""

@@ -8,8 +8,10 @@ from msgspec import Meta, Struct
 
 from prior_reinforce.arm.robots.limits import RobotLimits, match_joints
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.symmetry import Symmetry, declare_symmetry
+from prior_reinforce.units import factor
 
 WAYS = {
     "carried": "the arm carries the object until it leaves: turned about the base",
@@ -41,13 +43,22 @@ class DeclaredSymmetry(Struct, frozen=True, forbid_unknown_fields=True):
         """Whether motions are turned, and so sweep other parts of the room."""
         return self.object not in ("anywhere", "none")
 
-    def symmetry(self, form: PlanFormat, k: int, robot: RobotLimits | None) -> Symmetry:
-        """Make it for plans of this format, and outcomes of k components.
+    def symmetry(
+        self, form: PlanFormat, outcomes: OutcomeFormat, robot: RobotLimits | None
+    ) -> Symmetry:
+        """Make it for plans and outcomes of these formats.
 
         Raises:
             ConfigurationError: Plans or outcomes are not such that this can be done.
         """
         about: Literal["base"] | tuple[float, float] | None = None
+        lengths = [u for u in outcomes.units[:2] if factor(u, "m") not in (None, 1.0)]
+        if lengths and self.object != "none":  # else nothing but the outcome has a length
+            raise ConfigurationError(
+                f"outcomes are in {lengths[0]}, and a motion is turned or shifted in the metres of "
+                "the table; write units m ([outcome], --outcome-units): tables in other units are "
+                "converted, and trials may be told in any"
+            )
         if self.turns:
             about = "base" if isinstance(self.object, str) else self.object
         joints: list[int] = []
@@ -63,7 +74,7 @@ class DeclaredSymmetry(Struct, frozen=True, forbid_unknown_fields=True):
                 )
         return declare_symmetry(
             form,
-            k,
+            outcomes.outcome_dim,
             about=about,
             distance="shift" if self.object == "anywhere" else self.distance,
             chain=chain,

@@ -76,7 +76,7 @@ class Manifest:
         """
         if self.symmetry is None:
             return None
-        return self.symmetry.symmetry(form, self.outcome_format.outcome_dim, self.robot)
+        return self.symmetry.symmetry(form, self.outcome_format, self.robot)
 
     def check_fit(self, demonstrations: Demonstrations, source: str, path: Path) -> None:
         """Do nothing if demonstrations mean what this manifest, which stands at `path`, says.

@@ -19,9 +19,12 @@ from prior_reinforce.arm.workspace.manifest import LIMIT_LISTS, UNKNOWN
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.registry import parse_choice
 from prior_reinforce.settings import tomllib
+from prior_reinforce.units import factor
 
 TEMPLATE = Path(__file__).with_name("template.toml").read_text(encoding="utf-8")
 """The manifest that `new` writes, for `format` to fill in."""
+_TOLERANCE = 0.015
+"""What a new workspace of lengths counts as reached, in [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,9 +56,9 @@ class NewWorkspace:
     """Names of the outcome's components."""
     outcome_units: tuple[str, ...] = ("m",)
     """Unit of each component; a single one holds for all."""
-    tolerance: float | Sequence[float] = 0.015
+    tolerance: float | Sequence[float] = ()
     """Largest distance from the goal that counts as reached, in the outcome's units: one number,
-    or one for each component, which mixed units need."""
+    or one for each component, which mixed units need; 1.5 cm of lengths if not given."""
     symmetry: str | None = None
     """Where the object is before it leaves, so that one demonstration is enough: carried (by the
     arm, a throw), a place such as "0.43 0" (it lies there, pushed or struck), anywhere (the motion
@@ -101,14 +104,15 @@ class NewWorkspace:
         given = None
         if isinstance(robot, RobotLimits) and (is_file or robot.robot not in PRESETS):
             given = robot
-        numbers = np.atleast_1d(self.tolerance).tolist()
+        outcome_units = _spread(self.outcome_units, len(self.outcome_names))
+        numbers = np.atleast_1d(self.tolerance).tolist() or _usual_tolerance(outcome_units)
         text = TEMPLATE.format(
             name=_toml(self.name or folder)[1:-1],
             names=_toml(names),
             units=_toml(units),
             dt=self.dt,
             outcome_names=_toml(self.outcome_names),
-            outcome_units=_toml(_spread(self.outcome_units, len(self.outcome_names))),
+            outcome_units=_toml(outcome_units),
             tolerance=numbers[0] if len(numbers) == 1 else numbers,
             robot="given" if given is not None else known,
         )
@@ -195,6 +199,22 @@ def with_columns(text: str, names: Sequence[str], units: Sequence[str]) -> str:
         line = line.replace("\\", r"\\")
         plan = re.sub(rf"^[ \t]*{key}[ \t]*=[^\[]*\[[^\]]*\]", line, plan, count=1, flags=re.M)
     return head + plan
+
+
+def _usual_tolerance(units: Sequence[str]) -> list[float]:
+    """1.5 cm in each unit; one number where all are one unit.
+
+    Raises:
+        ConfigurationError: Some are no lengths.
+    """
+    numbers = [factor("m", unit) for unit in units]
+    if None in numbers:
+        raise ConfigurationError(
+            f"outcomes are in {', '.join(units)}: say how near to its goal an outcome counts as "
+            "reached, one number for each unit: --tolerance"
+        )
+    each = [float(f"{_TOLERANCE * number:.6g}") for number in numbers if number is not None]
+    return each[:1] if len({*units}) == 1 else each
 
 
 def _spread(values: Sequence[str], n: int) -> tuple[str, ...]:
