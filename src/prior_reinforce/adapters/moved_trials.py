@@ -48,8 +48,8 @@ class MovedTrials:
     def observe(self, condition: Point, goal: Point, reading: Reading) -> None:
         """Take in one trial; see `Adapter.observe`.
 
-        Where the object was lost, the next plan for that goal is moved half as far. What is read
-        then takes that back; where the object is lost again, plans stay nearer than those lost.
+        Where the object was lost, the next plan for that goal is moved half as far. As many
+        readings as losses take that back; until then plans stay nearer than those lost.
         """
         if reading.lost:
             self._lost.append((goal, self.chart.to(condition), self.now))
@@ -216,14 +216,14 @@ class MovedTrials:
     def _losses(self, goal: Point) -> list[tuple[Point, Points]]:
         """Aims for a goal that lost an object, each with the aims for that goal that were read.
 
-        None where one object was lost and a later trial was read: the loss no longer counts. What
-        was read counts only where several were lost.
+        None once as many trials were read since the last loss as were lost: objects are then lost
+        by chance, and not by going so far. What was read counts only where several were lost.
         """
         losses = [(aim, at) for about, aim, at in self._lost if np.array_equal(about, goal)]
         memory, again = self.belief.memory, len(losses) > 1
         of_goal = np.all(memory.goals == goal, axis=1)
         since = of_goal & (memory.numbers >= max((at for _, at in losses), default=0))
-        if not again and np.any(since):
+        if np.sum(since) >= len(losses):
             return []
         return [(aim, memory.conditions[of_goal & again]) for aim, _ in losses]
 
