@@ -15,7 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from prior_reinforce.arrays import Point, as_vector
-from prior_reinforce.errors import InvalidFeedbackError, InvalidGoalError, NotFittedError
+from prior_reinforce.errors import (
+    ConfigurationError,
+    InvalidFeedbackError,
+    InvalidGoalError,
+    NotFittedError,
+)
 from prior_reinforce.files import open_npz
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import Reading
@@ -33,7 +38,8 @@ class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
     trials: float | None = None
     """Trials until the goal is reached, this one included; None if nobody knows."""
     error: tuple[float, ...] | None = None
-    """Expected error, outcome minus goal, k numbers in the outcomes' units; None if unknown."""
+    """Expected error, outcome minus goal, k numbers in the outcomes' units, or an array of them;
+    None if unknown."""
     sd: tuple[float, ...] | None = None
     """Its standard deviation, likewise."""
     remark: str = ""
@@ -42,6 +48,14 @@ class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
     """Whether the plan is moved less far than readings say, because an object was lost."""
     beyond: bool = False
     """Whether no plan may be moved so far that it reaches the goal."""
+
+    def __post_init__(self) -> None:
+        """Keep plain numbers of whatever arrays were given, since journals write them down."""
+        for name in ("p_hit", "trials", "error", "sd"):
+            if (given := getattr(self, name)) is not None:
+                plain = np.asarray(given, np.float64).tolist()
+                value = tuple(plain) if isinstance(plain, list) else plain
+                msgspec.structs.force_setattr(self, name, value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,10 +74,10 @@ class State:
         return kind(*(self.arrays[field.name] for field in fields(kind)))  # type: ignore[arg-type]
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an `.npz`: the arrays, a JSON text and the key."""
-        texts = {"facts": json.dumps(self.facts), "key": self.key}
+        """Write an `.npz`: the arrays, and a JSON text of the rest."""
+        text = json.dumps({"facts": self.facts, "key": self.key})
         with open(path, "wb") as file:
-            np.savez(file, **self.arrays, **texts)  # type: ignore[arg-type]
+            np.savez(file, **self.arrays, facts=np.array(text))  # type: ignore[arg-type]
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> State:
@@ -74,8 +88,8 @@ class State:
         """
         with open_npz(Path(path), "delete it: trials are then told again") as archive:
             arrays = {name: archive[name] for name in archive.files}
-            facts, key = (str(arrays.pop(name)) for name in ("facts", "key"))
-            return cls(json.loads(facts), arrays, key)
+            told = json.loads(str(arrays.pop("facts")))
+            return cls(told["facts"], arrays, told["key"])
 
 
 def next_key(
@@ -222,12 +236,17 @@ class Adapter(ABC):
         Raises:
             NotFittedError: Before `start`.
             InvalidGoalError: Wrong shape, or not finite.
+            ConfigurationError: An adapter of one's own returned something else.
         """
-        return self._expect(
+        expected = self._expect(
             self._checked(condition, "condition", InvalidGoalError),
             self._checked(goal, "goal", InvalidGoalError),
             np.broadcast_to(np.asarray(tolerance, np.float64), self._outcome_dim or 0),
         )
+        if not isinstance(expected, Expectation):
+            name = type(self).__name__
+            raise ConfigurationError(f"{name}._expect must return an Expectation, got {expected!r}")
+        return expected
 
     def change_hardware(self) -> None:
         """Take note that the hardware changes between the trials before and those to come.

@@ -234,8 +234,7 @@ class DisplacedTrials:
         at, aim = (self._normalisation.apply(point) for point in (condition, goal))
         mean, variance = (of[0] for of in self._expected(self._places(at[None], aim)))
         scale = self._normalisation.scale
-        error, sd = (at + mean - aim) * scale, np.sqrt(variance) * scale
-        return Expectation(p_hit, trials, tuple(error.tolist()), tuple(sd.tolist()))
+        return Expectation(p_hit, trials, (at + mean - aim) * scale, np.sqrt(variance) * scale)
 
     def p_hit(self, conditions: Points, goals: Points, tolerance: Point) -> Float[np.ndarray, " n"]:
         """Return each condition's probability of a hit; see `BayesianAdapter.p_hit`."""

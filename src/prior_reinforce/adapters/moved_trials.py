@@ -100,15 +100,7 @@ class MovedTrials:
         nearer = bool(losses) and not np.allclose(self._aim(goal, losses), self._aim(goal, []))
         beyond = bool(self._beyond(goal))
         trials = None if beyond else trials_to_go(p_hit, self.belief.memory)
-        return Expectation(
-            p_hit,
-            trials,
-            tuple(error.tolist()),
-            tuple(sd.tolist()),
-            self.remark(goal),
-            nearer,
-            beyond,
-        )
+        return Expectation(p_hit, trials, error, sd, self.remark(goal), nearer, beyond)
 
     def p_hit(
         self, conditions: Points, goals: Points, tolerance: Point, seed: int = 1

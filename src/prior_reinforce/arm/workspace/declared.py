@@ -56,8 +56,8 @@ class DeclaredSymmetry(Struct, frozen=True, forbid_unknown_fields=True):
         if lengths and self.object != "none":  # else nothing but the outcome has a length
             raise ConfigurationError(
                 f"outcomes are in {lengths[0]}, and a motion is turned or shifted in the metres of "
-                "the table; write units m ([outcome], --outcome-units): tables in other units are "
-                "converted, and trials may be told in any"
+                "the table; write units m, and the tolerance in m ([outcome], --outcome-units): "
+                "tables in other units are converted, and trials may be told in any"
             )
         if self.turns:
             about = "base" if isinstance(self.object, str) else self.object

@@ -37,7 +37,7 @@ from prior_reinforce.session.events import Asked, Entry, Event
 from prior_reinforce.session.trials import Log, Trial
 
 JOURNAL_FILE = "journal.sqlite"
-JOURNAL_VERSION = 4
+JOURNAL_VERSION = 5
 # Ours: an operator's second window should wait out a command, not a training.
 _LOCK_TIMEOUT_S = 10.0
 
