@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from prior_reinforce.errors import InvalidFeedbackError
+from prior_reinforce.errors import InvalidFeedbackError, InvalidGoalError
 from prior_reinforce.formats import OutcomeFormat
-from prior_reinforce.parsing import from_words, read_place, read_uncertain_place
+from prior_reinforce.parsing import as_place, from_words, read_place, read_uncertain_place
 from prior_reinforce.readings import Reading
 from prior_reinforce.wording import (
     error_example,
@@ -47,6 +47,10 @@ INF = np.inf
         ("long by 5cm, left 2cm", [0.05, 0.02]),
         ("short 5", [-0.05, 0.0]),
         ("5cm too far", [0.05, 0.0]),
+        ("left 5cm long 2cm", [0.02, 0.05]),
+        ("long 5 left 2", [0.05, 0.02]),
+        ("to the left 5cm", [0.0, 0.05]),
+        ("5cm past", [0.05, 0.0]),
     ],
 )
 def test_words_are_read(words, error):
@@ -59,7 +63,13 @@ def test_words_are_read(words, error):
         "",
         "wide",
         "5 cm",
-        "long 5 left 2",
+        "long 5 left",
+        "long 5cm left",
+        "left 5cm long",
+        "right 2 cm short",
+        "early 20ms long",
+        "straight",
+        "miss, straight",
         "5 cm long, 2 cm short",
         "5cm high",
         "-5cm long",
@@ -107,9 +117,15 @@ def test_a_mere_direction_stands_for_five_centimetres():
 
 def test_what_cannot_be_read_is_named_once():
     with pytest.raises(
-        InvalidFeedbackError, match=r"^cannot read 'a bit long': it has 'bit',.*; write"
+        InvalidFeedbackError, match=r"^cannot read 'a hair long': it has 'hair',.*; write"
     ):
-        from_words("A bit long", METRES)
+        from_words("A hair long", METRES)
+
+
+@pytest.mark.parametrize("words", ["long 5cm left", "left 5cm long", "long, left 5cm short"])
+def test_one_length_with_two_directions_is_refused_with_the_right_form(words):
+    with pytest.raises(InvalidFeedbackError, match="5cm long, 2cm left"):
+        from_words(words, METRES)
 
 
 @pytest.mark.parametrize(
@@ -117,12 +133,13 @@ def test_what_cannot_be_read_is_named_once():
     [
         ("2 yards long", "it has 'yards', which is no unit (m, cm, mm, in)"),
         ("bit short", 'for instance "short" alone, or "5-10cm short"'),
-        ("way too far", 'for instance "long" alone'),
+        ("wildly far", 'for instance "long" alone'),
         ("3 fingers left", 'for instance "left" alone'),
         ("a hand short", "it has 'hand'"),
         ("in the hoop", 'or "hit" or "miss"'),
         ("5cm long, 5cm long", "names long twice"),
-        ("half a metre short", "it has 'half', which is no unit"),
+        ("quarter of a metre short", "it has 'quarter' and 'of', which is no unit"),
+        ("5cm late", "outcomes have no time: x \\[m], y \\[m]"),
         ("5cm wide", "it has 'wide', which is no unit .* and no direction"),
         ("1/2/3 in long", "write 0.5 for 1/2"),
     ],
@@ -322,6 +339,41 @@ def test_a_goal_of_more_than_a_turn_is_refused_as_65_metres_are():
 
 
 @pytest.mark.parametrize(
+    ("text", "turned"),
+    [("8rad", 8.0), ("8 rad", 8.0), ("460deg", np.deg2rad(460)), ("1.3turns", 2.6 * np.pi)],
+)
+def test_an_angle_of_more_than_a_turn_is_read_where_its_unit_is_said(text, turned):
+    assert read_place(text, of("rad")) == pytest.approx([turned])
+    error = from_words(f"{text} too far", of("rad")).error_seen
+    np.testing.assert_allclose(error, [turned])
+
+
+def test_the_remedy_for_a_bare_angle_of_more_than_a_turn_can_be_said():
+    with pytest.raises(InvalidFeedbackError, match=r"for instance 8deg, or 8rad$"):
+        read_place("8", of("rad"))
+    with pytest.raises(InvalidFeedbackError, match=r"8 rad .* say its unit, deg or rad"):
+        from_words("8 long", of("rad"))
+
+
+def test_a_stated_unit_is_not_asked_for():
+    with pytest.raises(InvalidFeedbackError, match="much more than a turn") as error:
+        read_place("4600deg", of("rad"))
+    assert "deg" not in str(error.value).removeprefix("4600deg")
+    with pytest.raises(InvalidFeedbackError, match="say it again"):
+        from_words("80rad long", of("rad"))
+
+
+def test_numbers_as_large_as_those_shown_are_in_the_outcomes_unit():
+    shown = np.array([[8.5], [-3.0]])
+    for place in ("8", np.array([8.0])):
+        assert as_place(place, of("rad"), shown) == pytest.approx([8.0])
+        with pytest.raises(InvalidGoalError, match="deg"):
+            as_place(place, of("rad"), shown[1:])
+    assert read_uncertain_place("8 +- 1", of("rad"), shown)[0] == pytest.approx([8.0])
+    assert as_place("8rad", of("rad"), shown[1:]) == pytest.approx([8.0])
+
+
+@pytest.mark.parametrize(
     ("text", "error"),
     [
         ("about 5cm long", [0.05, 0.0]),
@@ -333,6 +385,15 @@ def test_a_goal_of_more_than_a_turn_is_refused_as_65_metres_are():
         ("hit!", [0.0, 0.0]),
         ("spot on", [0.0, 0.0]),
         ("2 inches short", [-0.0508, 0.0]),
+        ("30cm way too long", [0.3, 0.0]),
+        ("one foot long", [0.3048, 0.0]),
+        ("a foot long", [0.3048, 0.0]),
+        ("half a metre short", [-0.5, 0.0]),
+        ("half an inch short", [-0.0127, 0.0]),
+        ("three cm left", [0.0, 0.03]),
+        ("5cms long", [0.05, 0.0]),
+        ("5cm long, straight", [0.05, 0.0]),
+        ("5cm short of the goal", [-0.05, 0.0]),
         ('2" short', [-0.0508, 0.0]),
     ],
 )
@@ -399,7 +460,9 @@ def test_components_have_the_words_of_their_names():
         (["m"], "5cm long"),
         (["in"], "2in long"),
         (["rad"], "5deg long"),
-        (["turns"], "0.2 long"),
+        (["turns"], "2turns too much"),
+        (["ml"], "2ml too much"),
+        (["1"], "2 too much"),
         (["s", "s"], ""),
         (["m"] * 4, ""),
     ],
@@ -408,6 +471,53 @@ def test_an_example_of_words_can_be_read(units, example):
     form = of(*units, names=["r0", "r1", "r2", "r3"])
     assert error_example(form) == example
     assert not example or from_words(example, form).has_number
+
+
+@pytest.mark.parametrize(
+    ("words", "error"),
+    [
+        ("25ml too much", 25.0),
+        ("25ml more", 25.0),
+        ("25ml over", 25.0),
+        ("over by 25ml", 25.0),
+        ("25 too much", 25.0),
+        ("25ml too many", 25.0),
+        ("25ml too little", -25.0),
+        ("25ml less", -25.0),
+        ("25ml under", -25.0),
+        ("25ml short of", -25.0),
+        ("25ml high", 25.0),
+    ],
+)
+def test_an_amount_has_its_own_words_and_the_sign_is_said(words, error):
+    read = from_words(words, of("ml", names=["amount"]))
+    np.testing.assert_allclose(read.error_seen, [error])
+    assert read.said.endswith(f" (amount {error:+g} ml)")
+
+
+def test_an_amount_may_be_told_without_a_number():
+    much, little = (from_words(f"too {word}", of("ml")) for word in ("much", "little"))
+    assert (much.low, much.high, little.low, little.high) == (0, INF, -INF, 0)
+    np.testing.assert_allclose(from_words("10 deg over", of("rad")).error_seen, [np.pi / 18])
+    with pytest.raises(InvalidFeedbackError, match='for instance "2ml too much"'):
+        from_words("green", of("ml"))
+    with pytest.raises(InvalidFeedbackError, match="'over'"):
+        from_words("5cm over", METRES)
+
+
+@pytest.mark.parametrize(
+    ("vague", "plain"),
+    [
+        ("a bit long", "long"),
+        ("slightly left", "left"),
+        ("way too far", "long"),
+        ("long, straight", "long, 0cm left"),
+    ],
+)
+def test_a_vague_distance_says_no_more_than_its_direction(vague, plain):
+    seen, expected = from_words(vague, METRES), from_words(plain, METRES)
+    np.testing.assert_allclose([seen.low, seen.high], [expected.low, expected.high])
+    assert seen.said == vague
 
 
 def test_what_was_said_is_shown_with_the_unit_that_was_understood():

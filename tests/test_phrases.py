@@ -33,6 +33,10 @@ def test_values_are_taken_by_their_names(text, values):
         ("1 1/2 in short, 1/4 in left", "1.5 in short, 0.25 in left"),
         ("2 ft short", "24 in short"),
         ("too far", "far"),
+        ("5cms past the goal, straight", "5cm long, 0cm left"),
+        ("between one and two cm long", "1-2 cm long"),
+        ("Half a foot short", "6 in short"),
+        ("far too long", "long"),
         ("5cm long, 2 cm left", "5cm long, 2 cm left"),
     ],
 )

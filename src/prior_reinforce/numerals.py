@@ -1,10 +1,12 @@
-"""Numbers as people write them: with decimal commas, or with a spread behind a `+-`."""
+"""Numbers as people write them: with decimal commas, a spread behind a `+-`, a unit and a word."""
 
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 from prior_reinforce.errors import InvalidFeedbackError
+from prior_reinforce.units import SPELT
 
 PLUS_MINUS = r"(?:\+-|\+/-|±)"
 NUMBER = r"\d{1,6}(?:\.\d*)?|\.\d+"
@@ -13,6 +15,31 @@ _DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d+\s*(?:[-–±+/]+\s*[\d.,]+\s*)?(?:[
 _BETWEEN, _LAST_UNIT = re.compile(r"[;,]?\s+|;"), re.compile(r"\s*(?:[^\W\d_]|[°\"%])\S*$")
 WITH_COMMA = re.compile(r"[+-]?\d+(?:[.,]\d+)?")
 _THOUSAND = re.compile(r"(?<![\d.,])[1-9]\d{0,2},\d{3}(?![\d.])")
+BARE_TERM = re.compile(rf"(?P<value>{NUMBER})\s*(?P<unit>{'|'.join(map(re.escape, SPELT))})")
+"""`92cm`."""
+
+
+@lru_cache(maxsize=8)
+def patterns(units: tuple[str, ...]) -> tuple[re.Pattern[str], ...]:
+    """Patterns of what is said of outcomes in these units, of which a task may have its own.
+
+    Of a term, `5-7 cm long`, `5 +- 0.5 cm long` or `long`; of one whose word is first, `long by
+    5cm`; and of a place, `92cm`, with what parts it from the next number.
+    """
+    own = {each for unit in units if unit != "1" for each in (unit, unit.lower())}
+    unit = "".join(  # some are none where letters follow: `2 somewhere`
+        re.escape(each) + "(?![a-z])" * (each in ("m", "in", "s", "h", *own)) + "|"
+        for each in sorted({*SPELT, *own}, key=len, reverse=True)
+    )
+    term = (
+        rf"(?:(?:(?P<least>{NUMBER})\s*(?P<least_unit>{unit})\s*-\s*)?"
+        rf"(?P<value>{NUMBER})\s*(?P<unit>{unit})\s*"
+        rf"(?:{PLUS_MINUS}\s*(?P<sd>{NUMBER})\s*(?P<sd_unit>{unit})\s*)?)?"
+        r"(?:to the )?(?P<word>[a-z]+)"
+    )
+    word_first = rf"(?:to the )?([a-z]+)\s+(?:by\s+)?((?:{NUMBER})\s*(?:{unit}))(?:\s+|$)"
+    place = rf"(?P<number>[+-]?(?:{NUMBER}))\s*(?P<unit>{unit})(?:\s*[,;]\s*|\s+|$)"
+    return tuple(re.compile(each, re.IGNORECASE) for each in (term, word_first, place))
 
 
 def with_points(text: str, k: int) -> str:

@@ -14,7 +14,6 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,18 +21,30 @@ from numpy.typing import ArrayLike
 from prior_reinforce.arrays import Point, as_error, as_goal
 from prior_reinforce.errors import InvalidFeedbackError, InvalidGoalError
 from prior_reinforce.formats import OutcomeFormat, in_tolerances
-from prior_reinforce.numerals import NUMBER, PLUS_MINUS, WITH_COMMA, read_numbers, with_points
+from prior_reinforce.numerals import (
+    BARE_TERM,
+    PLUS_MINUS,
+    WITH_COMMA,
+    patterns,
+    read_numbers,
+    with_points,
+)
 from prior_reinforce.phrases import plainer, values_by_name
 from prior_reinforce.readings import EYE_BETWEEN, OPEN_ERROR, Reading
 from prior_reinforce.units import SPELT, factor, kind_of, looks_like, spelt, units_of
 from prior_reinforce.wording import (
+    AMOUNT_WORDS,
     PLACE_WORDS,
+    SYNONYMS,
     TIME_WORDS,
     WORDS,
     bare_unit,
     error_words,
+    is_amount,
     place_example,
+    say_too_large,
     say_unread,
+    to_words,
 )
 
 _LEAST_BARE_CM = 0.1
@@ -44,38 +55,11 @@ in tolerances as far as 5 cm, where 1.5 cm are allowed."""
 _FAR = 10.0
 """Tolerances from which an error is looked at twice (ours): 15 cm, where 1.5 cm are allowed. It is
 taken for an outcome, or an outcome for an error, where that would be four times nearer."""
-_TOO_LARGE = {"length": "farther than any arm throws", "angle": "more than a turn"}
 _SOMEWHERE, _LOST = "somewhere", "lost"
 _ON_THE_GOAL = ("on the goal", "spot on", "0")
 _HITS = {"hit": True, "miss": False, _LOST: False}
 _RANGE = re.compile(r"(?<=[\da-z\"°.])\s*(?:–|-|\bto\b)\s*(?=\.?\d)")
 _COMMA, _NEXT = re.compile(r"\s*(?:,|;|\band\b)\s*"), re.compile(r"(?<=[a-z])\s+(?=\.?\d)")
-_BARE_TERM = re.compile(rf"(?P<value>{NUMBER})\s*(?P<unit>{'|'.join(map(re.escape, SPELT))})")
-"""`92cm`."""
-_SYNONYMS = {"far": "long", "beyond": "long", "above": "high", "below": "low"}
-
-
-@lru_cache(maxsize=8)
-def _patterns(units: tuple[str, ...]) -> tuple[re.Pattern[str], ...]:
-    """Patterns of what is said of outcomes in these units, of which a task may have its own.
-
-    Of a term, `5-7 cm long`, `5 +- 0.5 cm long` or `long`; of one whose word is first, `long by
-    5cm`; and of a place, `92cm`, with what parts it from the next number.
-    """
-    own = {each for unit in units if unit != "1" for each in (unit, unit.lower())}
-    unit = "".join(  # some are none where letters follow: `2 somewhere`
-        re.escape(each) + "(?![a-z])" * (each in ("m", "in", "s", "h", *own)) + "|"
-        for each in sorted({*SPELT, *own}, key=len, reverse=True)
-    )
-    term = (
-        rf"(?:(?:(?P<least>{NUMBER})\s*(?P<least_unit>{unit})\s*-\s*)?"
-        rf"(?P<value>{NUMBER})\s*(?P<unit>{unit})\s*"
-        rf"(?:{PLUS_MINUS}\s*(?P<sd>{NUMBER})\s*(?P<sd_unit>{unit})\s*)?)?"
-        r"(?:to the )?(?P<word>[a-z]+)"
-    )
-    word_first = rf"([a-z]+)\s+(?:by\s+)?((?:{NUMBER})\s*(?:{unit}))"
-    place = rf"(?P<number>[+-]?(?:{NUMBER}))\s*(?P<unit>{unit})(?:\s*[,;]\s*|\s+|$)"
-    return tuple(re.compile(each, re.IGNORECASE) for each in (term, word_first, place))
 
 
 def from_words(text: str, form: OutcomeFormat | None = None) -> Reading:
@@ -102,7 +86,7 @@ def from_words(text: str, form: OutcomeFormat | None = None) -> Reading:
     form = (form or OutcomeFormat.metres(2)).as_listed()
     if (error := _by_name(text, form)) is not None:
         for number, unit in zip(error, form.units, strict=True):
-            _refuse_too_large(number, unit, text)
+            _refuse_too_large(number, unit, text, stated=True)
         return replace(Reading.estimated(error, form.least_sd), said=text)
     parts = _parts(text, form)
     hits = {_HITS[part] for part in parts if part in _HITS}
@@ -117,10 +101,14 @@ def from_words(text: str, form: OutcomeFormat | None = None) -> Reading:
     if hit is not None and not directed:
         return replace(Reading.only(hit, form.outcome_dim, lost=_LOST in parts), said=text)
     terms = _terms(directed, text, form)
-    understood = {term.part: term.said for term in terms.values()}
-    as_it_is = all(part == said for part, said in understood.items())
-    said = text if as_it_is else ", ".join(understood.get(part, part) for part in parts)
-    return replace(_reading(terms, text, form, _SOMEWHERE in parts), hit=hit, said=said)
+    reading = _reading(terms, text, form, _SOMEWHERE in parts)
+    said = text
+    if not all(term.stated for term in terms.values()):
+        understood = {term.part: term.said for term in terms.values()}
+        said = ", ".join(understood.get(part, part) for part in parts)
+    if is_amount(form) and any(term.size is not None for term in terms.values()):
+        said += f" ({to_words(reading.error_seen, form)})"  # which sign the word was taken for
+    return replace(reading, hit=hit, said=said)
 
 
 def _by_name(text: str, form: OutcomeFormat) -> list[float] | None:
@@ -141,7 +129,7 @@ def _reading(terms: dict[int, _Term], text: str, form: OutcomeFormat, somewhere:
     for j, term in terms.items():
         unknown = OPEN_ERROR / metres[j] if is_length[j] else _OPEN_SDS * sds[j]
         number[j] = term.sign * (unknown if term.size is None else term.size)
-        _refuse_too_large(number[j], form.units[j], text)
+        _refuse_too_large(number[j], form.units[j], text, stated=term.stated)
     seen = Reading.estimated(number, sds)
     bounds = np.array([seen.low, seen.high, seen.sd])  # of each component
     if np.any(is_length):
@@ -162,13 +150,14 @@ def _reading(terms: dict[int, _Term], text: str, form: OutcomeFormat, somewhere:
     return Reading(number, *bounds)
 
 
-def _refuse_too_large(number: float, unit: str, text: str) -> None:
-    """Refuse an error that no arm makes."""
+def _refuse_too_large(number: float, unit: str, text: str, *, stated: bool) -> None:
+    """Refuse an error that no arm makes, or that may be in another unit than the one not stated."""
     base = "m" if kind_of(unit) == "length" else unit
-    if said := looks_like(base, number * (factor(unit, base) or 1.0)):
+    if said := looks_like(base, number * (factor(unit, base) or 1.0), stated=stated):
+        again = f"say it again, in {said}" if stated else f"say its unit, {said} or {unit}"
         raise InvalidFeedbackError(
-            f"{text!r} is {number:g} {unit}, {_TOO_LARGE[kind_of(unit)]}; say it again, in {said}, "
-            "or void the trial if that is true"
+            f"{text!r}: {say_too_large(number, unit, stated)}; {again}, or void the trial if that "
+            "is true"
         )
 
 
@@ -229,8 +218,13 @@ def as_bare_error(
     return error
 
 
-def as_place(place: ArrayLike | str, form: OutcomeFormat) -> Point:
+def as_place(place: ArrayLike | str, form: OutcomeFormat, shown: ArrayLike = 0.0) -> Point:
     """Return a goal as numbers in the outcome's units: it is given as such, or said (`read_place`).
+
+    Args:
+        place: The goal, shape (k,), or in words.
+        form: What the outcomes are.
+        shown: Outcomes that are known, (N, k); smaller numbers are in the outcomes' units.
 
     Raises:
         InvalidGoalError: It cannot be read, has another shape, is not finite, or of another unit by
@@ -238,34 +232,37 @@ def as_place(place: ArrayLike | str, form: OutcomeFormat) -> Point:
     """
     if isinstance(place, str):
         try:
-            return read_place(place, form)
+            return read_place(place, form, shown)
         except InvalidFeedbackError as error:
             raise InvalidGoalError(f"goal: {error}") from error
     array = as_goal(place, form.names)
-    if slip := form.slip(array, error=False):
+    if slip := form.slip(_beyond(array, shown), error=False):
         raise InvalidGoalError(f"goal: {slip}, or say its unit")
     return array
 
 
-def read_uncertain_place(text: str, form: OutcomeFormat) -> tuple[Point, float]:
+def read_uncertain_place(
+    text: str, form: OutcomeFormat, shown: ArrayLike = 0.0
+) -> tuple[Point, float]:
     """Read a place, and the standard deviation that may follow it: `92cm 10cm +- 2cm`.
 
     Raises:
         InvalidFeedbackError: As `read_place` does, or a `+-` for components of several units.
     """
     said, *spread = re.split(PLUS_MINUS, text, maxsplit=1)
-    place, of_sd = read_place(said, form), OutcomeFormat(("+-",), form.units[:1])
+    place, of_sd = read_place(said, form, shown), OutcomeFormat(("+-",), form.units[:1])
     sd = abs(float(read_place(spread[0], of_sd)[0])) if spread else 0.0
     if sd and len(set(form.units)) > 1:
         raise InvalidFeedbackError("+- is for components of one unit; leave it out")
     return place, sd
 
 
-def read_place(text: str, form: OutcomeFormat) -> Point:
+def read_place(text: str, form: OutcomeFormat, shown: ArrayLike = 0.0) -> Point:
     """Read a place from numbers in the outcome's units, numbers with a unit, or words.
 
     For instance `0.92 0.10`, `92cm 10cm`, `92 10 cm`, `x 92cm, y 10cm`, or `92cm ahead, 10cm left`;
     beside words, a number without one is the component in that position: `92cm, 10cm left`.
+    `shown` as for `as_place`.
 
     Raises:
         InvalidFeedbackError: It is none of these, has a `+-`, or is farther than any arm throws.
@@ -292,17 +289,22 @@ def read_place(text: str, form: OutcomeFormat) -> Point:
     if len(numbers) != k or not all(map(math.isfinite, numbers)):
         raise InvalidFeedbackError(f"{text!r} is not {expected}; give those")
     stated = read_numbers(text) is None
-    for number, unit in zip(numbers, form.units, strict=True):
-        possible = unit == "m" and not looks_like(unit, number, stated=True)
-        said = looks_like(unit, number)
-        if said and not looks_like(unit, numbers[0]) and WITH_COMMA.fullmatch(text.strip()):
+    for number, unit in zip(_beyond(numbers, shown), form.units, strict=True):
+        if not (said := looks_like(unit, number, stated=stated)):
+            continue
+        if not looks_like(unit, numbers[0]) and WITH_COMMA.fullmatch(text.strip()):
             raise InvalidFeedbackError(f"{text!r} may be one number; give {expected}")
-        if said and not (stated and possible):
-            raise InvalidFeedbackError(
-                f"{number:g} {unit} is {_TOO_LARGE[kind_of(unit)]}; say the unit, for instance "
-                f"{number:g}{said}" + (f", or {number:g}{unit}" if possible else "")
-            )
+        remedy = "correct the number or its unit"
+        if not stated:
+            remedy = f"say the unit, for instance {number:g}{said}"
+            remedy += f", or {number:g}{unit}" * (not looks_like(unit, number, stated=True))
+        raise InvalidFeedbackError(f"{say_too_large(number, unit, stated)}; {remedy}")
     return np.array(numbers)
+
+
+def _beyond(numbers: ArrayLike, shown: ArrayLike) -> Point:
+    """The numbers that are larger than all that was shown; 0 in place of the others."""
+    return np.where(np.abs(numbers) > np.max(np.abs(shown), axis=0), numbers, 0.0)
 
 
 def _numbers_with_units(text: str, units: Sequence[str]) -> list[float] | None:
@@ -312,7 +314,7 @@ def _numbers_with_units(text: str, units: Sequence[str]) -> list[float] | None:
     """
     if (bare := read_numbers(text)) is not None:
         return [number for number, _ in bare]
-    terms = list(_patterns(tuple(units))[2].finditer(text.strip()))
+    terms = list(patterns(tuple(units))[2].finditer(text.strip()))
     if "".join(term[0] for term in terms) != text.strip():
         return None
     stated = [term["unit"] and (spelt(term["unit"]) or term["unit"]) for term in terms]
@@ -340,6 +342,8 @@ class _Term:
     sign: float
     size: float | None
     """None where only the direction was said."""
+    stated: bool
+    """Whether the number has a unit, or there is none."""
     least: float | None = None
     """Lower end of a range, whose upper one is `size`."""
     sd: float | None = None
@@ -350,9 +354,16 @@ def _parts(text: str, form: OutcomeFormat) -> list[str]:
     """Split a text at commas, without fillers, in lower case."""
     plain = with_points(plainer(text), 0)
     said = [part.rstrip(".! ") for part in _COMMA.split(_RANGE.sub("-", plain))]
-    _, first, _ = _patterns(form.units)
-    turned = [first.sub(r"\2 \1", p) if first.fullmatch(p) else p for p in said]
-    return [part.rstrip(".! ") for each in turned for part in _NEXT.split(each)]
+    _, first, _ = patterns(form.units)
+    parts: list[str] = []
+    for part in said:
+        if part and not first.sub("", part):
+            parts += [f"{length} {word}" for word, length in first.findall(part)]
+        elif part[:1].isalpha() and part.split()[0] not in (*_HITS, _SOMEWHERE):
+            parts.append(part)  # in `long 5cm left`, nobody knows which of them is 5 cm
+        else:
+            parts += [each.rstrip(".! ") for each in _NEXT.split(part)]
+    return parts
 
 
 def _terms(
@@ -367,24 +378,24 @@ def _terms(
             pair if kind == "length" else None for pair, kind in zip(pairs, kinds, strict=True)
         ]
     known = {word: (j, pair) for j, pair in enumerate(pairs) if pair for word in pair}
-    # Whatever is more of it; which sign was understood is said.
-    invented = form.outcome_dim == 1 and kind_of(form.units[0]) not in ("length", "time")
     if form.outcome_dim == 1 and kind_of(form.units[0]) != "length":
-        known |= {word: (0, pair) for pair in (*words, TIME_WORDS) for word in pair}
+        others = (*words, TIME_WORDS, *[AMOUNT_WORDS] * is_amount(form))
+        known |= {word: (0, pair) for pair in others for word in pair}
     terms: dict[int, _Term] = {}
     for position, part in enumerate(parts):
-        match, bare = _patterns(form.units)[0].fullmatch(part), _BARE_TERM.fullmatch(part)
+        match, bare = patterns(form.units)[0].fullmatch(part), BARE_TERM.fullmatch(part)
         found = {} if match is None else match.groupdict()
         if not place and found:
-            found["word"] = _SYNONYMS.get(found["word"], found["word"])
+            found["word"] = SYNONYMS.get(found["word"], found["word"])
         beside = place and len(parts) > 1 and position < len(pairs)
         if bare and beside and factor(SPELT[bare["unit"]], form.units[position]) is not None:
             found, j, pair = bare.groupdict(), position, pairs[position]
         elif found.get("word") not in known or (
             place and (not found["value"] or found["sd"] or found["least"])
         ):
-            said = [_SYNONYMS.get(word, word) for word in re.findall("[a-z]+", part)]
-            direction = next((word for word in said if word in known), "")
+            said = [SYNONYMS.get(word, word) for word in re.findall("[a-z]+", part)]
+            directions = [word for word in said if word in known]
+            direction = directions[0] if len(directions) == 1 else ""
             raise InvalidFeedbackError(say_unread(part, text, [*known], form, place, direction))
         else:
             j, pair = known[found["word"]]
@@ -393,9 +404,6 @@ def _terms(
             twice = found["word"] if again else " and ".join(pair or form.names[j])
             raise InvalidFeedbackError(f"{text!r} names {twice} twice; give each direction once")
         terms[j] = _term(part, found, pair, form.units[j], form.outcome_dim)
-        if invented and (size := terms[j].size) is not None:
-            meant = f"{form.names[j]} {terms[j].sign * size:+g} {form.units[j]}".removesuffix(" 1")
-            terms[j] = replace(terms[j], said=f"{terms[j].said} ({meant})")
     return terms
 
 
@@ -404,16 +412,17 @@ def _term(
 ) -> _Term:
     """Convert the numbers of a part to the component's unit."""
     word, value, least, sd = (found.get(name) for name in ("word", "value", "least", "sd"))
-    numbers: list[float | None] = []
-    for name, number in (("value", value), ("least", least), ("sd", sd)):
-        stated = found.get(f"{name}_unit") or found.get("unit") or found.get("sd_unit") or ""
-        numbers.append(_in_unit(number, stated, unit, k, part) if number else None)
-    said = part
-    if value and not found.get("unit") and not found.get("sd_unit"):
-        range_, spread = f"{least}-" if least else "", f" +- {sd}" if sd else ""
-        said = f"{range_}{value}{spread}" + f" {bare_unit(unit)}" * (unit != "1") + f" {word}"
+    of_all = found.get("unit") or found.get("sd_unit") or ""
+    size, low, spread = (
+        _in_unit(number, found.get(f"{name}_unit") or of_all, unit, k, part) if number else None
+        for name, number in (("value", value), ("least", least), ("sd", sd))
+    )
+    said, stated = part, bool(of_all or not value)
+    if not stated:
+        number = f"{least}-" * bool(least) + f"{value}" + f" +- {sd}" * bool(sd)
+        said = f"{number} {bare_unit(unit)}".removesuffix(" 1") + f" {word}"
     sign = -1.0 if pair is not None and word == pair[1] else 1.0
-    return _Term(part, said, sign, *numbers)
+    return _Term(part, said, sign, size, stated, low, spread)
 
 
 def _in_unit(number: str, stated: str, unit: str, k: int, part: str) -> float:

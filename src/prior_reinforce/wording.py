@@ -7,6 +7,7 @@ An operator stands behind the robot and looks along x, from the robot's base ove
     y                 left or right                   left or right
     z                 high or low                     up or down
     a time            late or early
+    another amount    too much or too little
 
 A component is x, y or z by its name, else by its position. An error is outcome minus goal. Lengths
 are said in centimetres, errors of other tasks by their names and units. `parsing` reads the words.
@@ -35,6 +36,15 @@ PLACE_WORDS: tuple[tuple[str, str], ...] = (("ahead", "behind"), ("left", "right
 """The same for a place."""
 TIME_WORDS: tuple[str, str] = ("late", "early")
 """The same for a component that is a time."""
+AMOUNT_WORDS: tuple[str, str] = ("too much", "too little")
+"""The same for the only component, where it is no length, time or angle: ml, pins."""
+SYNONYMS = {
+    **dict.fromkeys(("far", "beyond", "past"), "long"),
+    **{"above": "high", "below": "low"},
+    **dict.fromkeys(("much", "many", "more", "over"), AMOUNT_WORDS[0]),
+    **dict.fromkeys(("little", "few", "less", "under"), AMOUNT_WORDS[1]),
+}
+"""Other words of an error, and which of these they mean."""
 _AXES = {"x": 0, "y": 1, "z": 2, "height": 2}
 CHANCES = (0.0, 0.1), (0.1, 0.65), (0.65, 1.0)
 """Bounds of P(hit) for each word that says how likely a hit is."""
@@ -124,10 +134,17 @@ def say_place(place: ArrayLike, form: OutcomeFormat) -> str:
     return _components(place, form)
 
 
+def is_amount(form: OutcomeFormat) -> bool:
+    """Whether outcomes are one number that is no length and no time, as an angle or ml are."""
+    return form.outcome_dim == 1 and kind_of(form.units[0]) not in ("length", "time")
+
+
 def error_words(
     form: OutcomeFormat, words: Sequence[tuple[str, str]] = WORDS
 ) -> list[tuple[str, str] | None]:
     """For each component the words where it is positive and negative; None where it has none."""
+    if is_amount(form) and kind_of(form.units[0]) != "angle":
+        return [AMOUNT_WORDS]
     pairs = [
         TIME_WORDS if kind_of(unit) == "time" else words[axis] if axis < len(words) else None
         for axis, unit in zip(axes_of(form), form.units, strict=True)
@@ -189,17 +206,27 @@ def say_unread(
         listed = f" ({said_units})" if said_units else ""
         those = " and ".join(map(repr, unknown))
         where += f": it has {those}, which is no unit{listed} and no direction"
+        if {*unknown} & {*TIME_WORDS}:
+            where += f"; outcomes have no time: {form}"
     elif "/" in part:
         where += ": write 0.5 for 1/2"
-    words = f"a length and one of {', '.join(known)}" if known else "a number and its unit"
+    number = "a length" if any(kind_of(u) == "length" for u in form.units) else "a number, its unit"
+    words = f"{number} and one of {', '.join(known)}" if known else "a number and its unit"
     return f"cannot read {part!r}{where}; write {words}{said}"
+
+
+def say_too_large(number: float, unit: str, stated: bool) -> str:
+    """Say that an arm makes no such number, or makes it only if its unit was stated."""
+    if kind_of(unit) == "length":
+        return f"{number:g} {unit} is farther than any arm throws"
+    return f"{number:g} {unit} is {'much ' * stated}more than a turn"
 
 
 def _example(j: int, unit: str, k: int) -> str:
     """A number with a unit for component j of k; empty where only that unit itself is known."""
     if kind_of(unit) == "length":
         return "2in" if unit == "in" else _EXAMPLE_LENGTHS[j]
-    return _EXAMPLES.get(kind_of(unit), "0.2" if k == 1 else "")
+    return _EXAMPLES.get(kind_of(unit), f"2{unit}".removesuffix("1") if k == 1 else "")
 
 
 def say_length(length: float, form: OutcomeFormat) -> str:

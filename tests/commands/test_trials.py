@@ -1,6 +1,7 @@
 """`ask` and `export`: where plans go, and what runs them."""
 
 import json
+import math
 import re
 import shutil
 import sqlite3
@@ -144,6 +145,50 @@ def test_a_number_without_a_unit_is_said_to_be_in_the_tasks(
     status, out, _ = run("tell", "slide", "1", said)
     assert status == 0
     assert f"; numbers without a unit are {spelt}\n" in out
+
+
+@pytest.mark.parametrize(
+    ("unit", "said"),
+    [
+        ("rad", "1 rad too far"),
+        ("rad", "20deg high"),
+        ("ml", "2ml long"),
+        ("ml", "2 ml too much, miss"),
+        ("in", "one foot long"),
+    ],
+)
+def test_a_unit_that_was_given_is_not_called_missing(run, tmp_path, monkeypatch, unit, said):
+    monkeypatch.chdir(tmp_path)
+    slide(run, tmp_path, unit)
+    run("goal", "slide", "2")
+    run("ask", "slide")
+    for tell in ((said,), ("--error", said)):
+        verb = "tell" if tell == (said,) else "amend"
+        status, out, _ = run(verb, "slide", "1", *tell)
+        assert status == 0
+        assert said in out
+        assert "without a unit" not in out
+
+
+def test_an_amount_is_asked_for_in_its_own_words_and_unit(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    slide(run, tmp_path, "ml")
+    run("goal", "slide", "2")
+    assert '--error "_ml too much"' in run("ask", "slide")[1]
+
+
+@pytest.mark.filterwarnings("ignore:goal x 8.028 rad lies")
+def test_a_goal_of_more_than_a_turn_is_set_where_its_unit_is_said(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    slide(run, tmp_path, "rad")
+    status, _, err = run("goal", "slide", "8")
+    assert status == 2
+    assert "8rad" in err
+    assert run("goal", "slide", "460deg")[0] == 0
+    run("ask", "slide")
+    assert run("tell", "slide", "1", "--outcome", "7.5")[0] == 0
+    (trial,) = trials_in(tmp_path / "slide")
+    assert trial.error_seen == pytest.approx([7.5 - math.radians(460)])
 
 
 def slide(run, folder, unit):

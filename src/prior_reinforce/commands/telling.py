@@ -150,7 +150,7 @@ def _ask_what_was_seen(workspace: Workspace, number: int, words: tuple[str, ...]
 def _say_told(now: Standing, trial: Trial, typed: tuple[str, ...]) -> str:
     """What was told as it was understood, and that numbers had no unit, if so."""
     said, words = say_trial(now, trial), "" if trial.reading is None else trial.reading.said
-    no_unit = words not in " ".join(typed)
+    no_unit = words.split(" (")[0] not in " ".join(typed)  # before the sign that was understood
     bare = bare_units(now.manifest.outcome_format)
     return f"{said}; numbers without a unit are {bare}" if no_unit else said
 
@@ -207,6 +207,6 @@ def read_landed(text: str, goal: Goal) -> Reading:
         )
     if numbers is not None:
         as_bare_error([number for number, _ in numbers], goal.goal, form, landed=True)
-    place, sd = read_uncertain_place(text, form)
+    place, sd = read_uncertain_place(text, form, goal.goal[None])
     error = place - goal.goal
     return Reading.measured(error, sd) if sd else Reading.estimated(error, form.least_sd)

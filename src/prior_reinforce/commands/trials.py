@@ -131,8 +131,8 @@ class Ask(OnWorkspace):
         self._check_out(now.state)
         if self.goal is not None:
             place, goals = " ".join(self.goal), now.state.goals
-            known = workspace.manifest.outcome_format
-            if not goals or goals[-1].goal.tolist() != [*as_place(place, known)]:
+            known, shown = workspace.manifest.outcome_format, workspace.demonstrations.outcomes_seen
+            if not goals or goals[-1].goal.tolist() != [*as_place(place, known, shown)]:
                 workspace.set_goal(place)
             print_goal(workspace)
         session = workspace.session()

@@ -26,6 +26,7 @@ _MEANS = {
     "left": "left and right are as seen from behind the robot",
     "high": "high is above the goal, low below it",
     "late": "late is after the goal's time, early before it",
+    "too much": "too much is more than the goal, too little less",
 }
 
 

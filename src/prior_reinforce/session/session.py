@@ -190,9 +190,10 @@ class Session:
         state = self.state
         state.refuse_open_trial("setting a goal")  # before anything is said of the goal
         demonstrations = self._parts(state).demonstrations
-        checked = demonstrations.check_goal(as_place(goal, demonstrations.outcome_format))
+        form, shown = demonstrations.outcome_format, demonstrations.outcomes_seen
+        checked = demonstrations.check_goal(as_place(goal, form, shown))
         given = self._tolerance if tolerance is None else tolerance
-        form = demonstrations.outcome_format.within(() if given is None else given)
+        form = form.within(() if given is None else given)
         carried = self._carry_over if carry_over is None else carry_over
         if carried is None:
             if adapter:

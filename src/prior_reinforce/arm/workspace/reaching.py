@@ -39,7 +39,8 @@ def require_reach(workspace: Workspace, goal: ArrayLike) -> None:
     training, form = workspace.state.training, workspace.manifest.outcome_format
     if training is None or workspace.state.stale or workspace.manifest.robot is None:
         return
-    shown, place = workspace.demonstrations, as_place(goal, form)
+    shown = workspace.demonstrations
+    place = as_place(goal, form, shown.outcomes_seen)
     if shown.symmetry is None:
         return
     generator, check = workspace.model, reach_check(workspace)

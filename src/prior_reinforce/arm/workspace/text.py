@@ -229,7 +229,7 @@ def tell_example(manifest: Manifest) -> str:
     """How an error of this task can be told."""
     form = manifest.outcome_format
     if example := error_example(form):  # without numbers, which somebody in a hurry would take
-        return f'--error "{re.sub("[0-9]+", "_", example)}"'
+        return '--error "' + re.sub(r"\b[0-9]+", "_", example) + '"'
     return "--error " + " ".join(f"D{_placeholder(name)}" for name in form.names)
 
 
