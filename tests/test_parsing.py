@@ -618,3 +618,9 @@ def test_the_sign_that_a_word_was_given_is_said_where_it_has_none_of_its_own():
     bearing = OutcomeFormat(("bearing",), ("deg",))
     assert from_words("5 deg right", bearing).said == "5 deg right (bearing -5 deg)"
     assert from_words("5cm right", METRES).said == "5cm right"
+
+
+@pytest.mark.parametrize("text", ["6m long", "6 m long, 2cm left", "600cm long"])
+def test_an_error_farther_than_any_arm_throws_is_refused_whatever_its_unit(text):
+    with pytest.raises(InvalidFeedbackError, match="farther than any arm throws"):
+        from_words(text)
