@@ -2,7 +2,7 @@
 
 import sys
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import pytest
 
@@ -226,3 +226,19 @@ def test_a_part_of_a_network_leaves_the_rest_as_it_is_set():
     made = make_generator("diffusion,network.widths=8:16,timing=none,symmetry=none")
     laptop = DiffusionConfig().network
     assert made.config.network == replace(laptop, widths=(8, 16))
+
+
+@pytest.mark.parametrize(
+    ("given", "remedy"),
+    [({"cloth": "silk"}, True), ({"lining": "silk"}, True), ({"gain": "silk"}, False)],
+)
+def test_words_are_told_for_a_remedy_where_nothing_but_words_will_do(given, remedy):
+    @dataclass(frozen=True)
+    class Cut:
+        cloth: Literal["cotton", "linen"] = "cotton"
+        lining: Literal["cotton", "linen"] | None = None
+        gain: float | Literal["cotton", "linen"] = 1.0
+
+    with pytest.raises(ConfigurationError) as caught:
+        build(Cut, given)
+    assert ("cotton, linen" in str(caught.value)) == remedy

@@ -4,6 +4,7 @@ A message is one line that names the value, what was expected and the remedy; th
 prints it as it stands and exits with status 2, or 1 if something was written before it.
 """
 
+from types import NoneType
 from typing import Any, Literal, get_args, get_origin
 
 
@@ -96,7 +97,9 @@ class WorkspaceError(PriorReinforceError, RuntimeError):
 
 
 def one_of(hint: Any) -> str:
-    """The remedy for a value that is none of a `Literal`; empty for any other annotation."""
-    kinds = [kind for kind in (hint, *get_args(hint)) if get_origin(kind) is Literal]
-    values = [str(value) for kind in kinds for value in get_args(kind)]
-    return f"; use one of {', '.join(values)}" if values else ""
+    """The remedy for a value that is none of a `Literal`; empty where another kind may stand."""
+    alternatives = (hint,) if get_origin(hint) is Literal else get_args(hint)
+    kinds = [kind for kind in alternatives if kind is not NoneType]
+    if not kinds or any(get_origin(kind) is not Literal for kind in kinds):
+        return ""
+    return f"; use one of {', '.join(str(value) for kind in kinds for value in get_args(kind))}"
