@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from prior_reinforce.arm.console.camera import Calibrate, Look, Pictures, _known_points
 from prior_reinforce.arm.console.verbs import Ask, SetGoal
@@ -142,6 +142,19 @@ def test_the_ball_is_found_by_its_colour(pictures):
         pictures.find(Look("the blue ball", 0.04))
     with pytest.raises(PerceptionFailedError, match="is the server running"):
         pictures.find(Look("the orange ball", 0.04, "model"))
+
+
+def test_what_is_not_round_may_look_flat(pictures):
+    image = Image.open(io.BytesIO(jpeg()))
+    (left, bottom), (right, top) = pixel([0.9, 0.1]), pixel([1.0, -0.1])
+    ImageDraw.Draw(image).rectangle((left, top, right, bottom), fill=(255, 140, 0))
+    encoded = io.BytesIO()
+    image.save(encoded, "JPEG", quality=95)
+    calibrated(pictures)
+    pictures.keep(encoded.getvalue())
+    found = pictures.find(Look("the orange book", 0.2))
+    np.testing.assert_allclose(found.place, [0.95, 0.0], atol=0.005)
+    assert found.sd == pictures.look_up().sd
 
 
 def test_a_picture_is_of_the_trial_that_waits(pictures, verbs):

@@ -162,7 +162,7 @@ class Pictures:
         calibration = self._calibration()
         if calibration is None:
             raise ConfigurationError("the camera is not calibrated; touch the known points first")
-        wanted = SeenObject(body.words, body.size)
+        wanted = SeenObject(body.words, body.size, round=False)  # nobody says its shape
         scene = TableScene(wanted, wanted, plane_height=calibration.height)
         client = ColourClient(self._vlm.family) if body.by == "colour" else None
         with VisionLanguageModel(scene, self._vlm, client=client, calibration=calibration) as model:
