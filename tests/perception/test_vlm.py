@@ -328,6 +328,26 @@ class Slanted:
         ) as perception:
             return perception._misread(*found, self.picture)
 
+    def scale(self, places, loose):
+        """The scale that is told of round boxes so many times as large as flat rings there."""
+        found = []
+        for place, times, wanted in zip(places, loose, (SCENE.reached, SCENE.goal), strict=True):
+            centre = self.calibration.to_pixels(np.array(place))
+            half = times * self.calibration.seen(centre, wanted.size)[0] / 2
+            box = np.array([centre - half, centre + half]).ravel()
+            found.append(Sighting(wanted.words, (), tuple(box.tolist()), np.array(place)))
+        with VisionLanguageModel(
+            SCENE, client=ColourClient(), calibration=self.calibration
+        ) as perception:
+            return perception._scale(*found, self.picture)
+
+
+@pytest.mark.parametrize("times", [0.7, 0.85, 1.0, 1.2, 1.3, 1.5])
+def test_one_scale_of_both_objects_is_told_by_a_slanted_camera_too(times, slanted):
+    places = [(1.2, -0.3), (0.7, 0.2)]
+    assert slanted.scale(places, (times, times)) == pytest.approx(times, abs=0.02)
+    assert slanted.scale(places, (times, times + 0.4)) == 1.0  # none of both
+
 
 def test_too_large_boxes_in_pixels_of_a_slanted_camera_are_not_taken_for_swapped_ones(slanted):
     rng, told = np.random.default_rng(0), []

@@ -222,12 +222,16 @@ class VisionLanguageModel(Perception):
         assert goal.box is not None
         found = [(reached.box, self.scene.reached.size), (goal.box, self.scene.goal.size)]
         seen = [_sides(box, self._in(picture), size) for box, size in found]
-        scales = [np.clip(1, (of / ball).min(), (of / disc).max()) for of, disc, ball in seen]
-        chance = [_DRAWN * _step(picture) / ball for _, _, ball in seen]
-        surest = int(np.argmin(chance))
-        if abs(scales[0] - scales[1]) > sum(chance) or abs(scales[surest] - 1) <= chance[surest]:
+        chance = np.array([_DRAWN * _step(picture) / ball for _, _, ball in seen])
+        # No side of an object is above a ball's, and its longest is not below a flat disc's.
+        least = np.array([(sides / ball).max() for sides, _, ball in seen])
+        most = np.array([(sides / disc).max() for sides, disc, _ in seen])
+        low, high = (least - chance).max(), (most + chance).min()
+        if low > high or low <= 1 <= high:
             return 1.0
-        return float(scales[surest])
+        return float(
+            least[np.argmax(least - chance)] if low > 1 else most[np.argmin(most + chance)]
+        )
 
     def _swapped(self, box: Box, wide: float) -> Box:
         """The box of the same numbers with x and y swapped, in a picture so many times as wide."""
