@@ -570,6 +570,31 @@ def test_an_object_that_the_border_cuts_is_told(drawn_table, capsys):
     assert said.out.rstrip().endswith("+-0.015")
 
 
+@pytest.mark.parametrize(
+    ("size", "flags", "says"),
+    [
+        ("0.08", (), None),  # drawn loosely
+        ("0.06", (), "is its size right"),
+        ("0.06", ("--no-goal-round",), "is its size right"),
+        ("0.15", (), "--no-goal-round"),
+        ("0.15", ("--no-goal-round",), None),
+    ],
+)
+def test_a_goal_that_is_whole_is_not_said_to_be_cut(drawn_table, capsys, size, flags, says):
+    """A hoop of 0.1 m, which a post of its colour makes 0.15 m long where it is that large."""
+    if size == "0.15":
+        photo = Image.open(drawn_table / "photo.png")
+        ImageDraw.Draw(photo).rectangle((866, 450, 979, 480), fill=(220, 0, 0))
+        photo.save(drawn_table / "photo.png")
+    with VisionServer() as server:
+        assert look(drawn_table, server.base_url, "--goal-size", size, *flags) == 0
+    said = capsys.readouterr()
+    assert ("the red hoop" in said.err) == (says is not None)
+    assert (says or "") in said.err
+    assert ("--no-" in said.err) == (says == "--no-goal-round")
+    assert "cut" not in said.err
+
+
 def test_a_calibration_that_is_none_names_the_command_that_writes_one(drawn_table, run):
     for name in ("points.csv", "nothing.json"):
         objects = ("--reached", "the ball", "--reached-size", "0.06", "--goal", "the hoop")

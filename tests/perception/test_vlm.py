@@ -520,3 +520,28 @@ def test_a_distance_in_a_picture_that_is_shrunk_a_little_is_no_surer_than_it_is_
         assert (wrong <= 1.5 * reading.sd).all()
         told_on_980_px = shrunk * 1000 / 980
         assert shrunk > 0.9 or reading.scale == pytest.approx(told_on_980_px, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("times", "hidden", "is_round", "cause"),
+    [
+        (1.0, None, True, None),
+        (1.15, None, True, None),  # as models draw boxes, on all sides alike
+        (1.28, None, False, None),
+        (1.5, None, True, "too large"),
+        (1.0, (0, 0, 999, 400), True, "hidden"),
+        (1.0, (0, 0, 999, 400), False, None),  # half a disc may be all of what is not round
+        (1.0, (500, 0, 999, 799), True, "hidden"),
+    ],
+)
+def test_a_box_that_may_be_beside_the_object_says_by_what(times, hidden, is_round, cause, flat):
+    picture = painted((1.0, 0.0, 0.1 * times), hidden=hidden)
+    seen = found_by_colour(picture, flat, 0.2, is_round=is_round)
+    assert seen.off_by == cause
+    assert (flat.sd_off(seen.off) > flat.sd).any() == (cause is not None)
+
+
+def test_a_box_at_the_border_is_cut_whatever_the_object_is(flat):
+    for is_round in (True, False):
+        picture = painted((1.0, 1.0, 0.06))
+        assert found_by_colour(picture, flat, 0.12, is_round=is_round).off_by == "cut"

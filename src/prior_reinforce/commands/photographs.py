@@ -212,9 +212,10 @@ class Look:
         error, sd = reading.error_seen, reading.sd
         if error is None or sd is None:
             raise _refused(f"{reading.problem}; look at {drawn} and tell what you see yourself")
-        for sighting in filter(None, (reading.reached, reading.goal)):
-            _warn_if_beyond(here, sighting)
-            _warn_if_in_part(here, sighting)
+        for sighting, name in ((reading.reached, "reached"), (reading.goal, "goal")):
+            if sighting is not None:
+                _warn_if_beyond(here, sighting)
+                _warn_if_off(here, sighting, name)
         if reading.scale != 1:
             warn(
                 f"both objects look {reading.scale:.2f} times as large as they are: is the picture "
@@ -304,14 +305,20 @@ def _warn_if_beyond(calibration: TableCalibration, sighting: Sighting) -> None:
         )
 
 
-def _warn_if_in_part(calibration: TableCalibration, sighting: Sighting) -> None:
+def _warn_if_off(calibration: TableCalibration, sighting: Sighting, name: str) -> None:
     """Warn of an object whose box is not around it alone and as a whole."""
-    if (calibration.sd_off(sighting.off) > calibration.sd).any():
-        warn(
-            f"{sighting.words} is cut by the picture's border, half hidden, or in one box with "
-            f"something else: its middle may be {100 * np.linalg.norm(sighting.off):.1f} cm off; "
-            "show all of it (or say --no-reached-round, --no-goal-round of what is not round)"
-        )
+    if sighting.off_by is None or (calibration.sd_off(sighting.off) <= calibration.sd).all():
+        return
+    may_be = f"its middle may be {100 * np.linalg.norm(sighting.off):.1f} cm off"
+    warn(
+        {
+            "cut": f"{sighting.words} is cut by the picture's border: {may_be}; show all of it",
+            "hidden": f"{sighting.words} is half hidden: {may_be}; show all of it, or say "
+            f"--no-{name}-round if it is not round",
+            "too large": f"the box of {sighting.words} is larger than it is: {may_be}; is "
+            "something else in it, is its size right?",
+        }[sighting.off_by]
+    )
 
 
 def _check_turn(picture: Path, pixels: Float[np.ndarray, "n 2"], size: tuple[int, int]) -> None:

@@ -26,7 +26,7 @@ from prior_reinforce.perception.vlm_client import (
     VisionLanguageModelConfig,
 )
 from prior_reinforce.perception.vlm_formats import FORMATS, Box, UnreadableAnswerError
-from prior_reinforce.perception.vlm_reading import Answer, PictureReading, Sighting
+from prior_reinforce.perception.vlm_reading import Answer, OffBy, PictureReading, Sighting
 from prior_reinforce.readings import Reading
 
 if TYPE_CHECKING:
@@ -275,8 +275,8 @@ class VisionLanguageModel(Perception):
             box = _agreed(boxes, calibration, self.config.spread_gate)
             if len(boxes) >= votes and box is not None:
                 place = calibration.to_table(_centres(np.array([box])))[0]
-                off = _off(box, calibration, wanted, picture)
-                return Sighting(words, tuple(answers), box, place, off)
+                off, by = _off(box, calibration, wanted, picture)
+                return Sighting(words, tuple(answers), box, place, off=off, off_by=by)
         if len(boxes) >= votes:
             gate_cm = 100 * self.config.spread_gate
             why = f"{len(boxes)} answers do not agree on a place to {gate_cm:g} cm"
@@ -360,19 +360,26 @@ def _sides(
 
 def _off(
     box: Box, calibration: TableCalibration, wanted: SeenObject, picture: Picture
-) -> Float[np.ndarray, "2"]:
-    """How far an object's middle may be beside its box's, in [m]: half of what the sides are off.
+) -> tuple[Float[np.ndarray, "2"], OffBy | None]:
+    """How far an object's middle may be beside its box's, in [m], and by what most.
 
-    A side at the picture's border lacks what is cut, one that is shorter than the other (where the
-    object is round) what is hidden; one that is too long is around something else, too.
+    That is half of what the sides are off: one at the picture's border lacks what is cut, one that
+    is shorter than the other (where the object is round) what is hidden; one that is longer than
+    boxes are drawn loosely is around something else, too.
     """
     sides, disc, ball = _sides(box, calibration, wanted.size)
     ends, border = np.reshape(box, (2, 2)), np.array(picture.shape[1::-1]) - _step(picture)
     cut = (ends[0] <= _step(picture)) | (ends[1] >= border)
     round_one = min((sides / disc).max(), 1.0) * disc if wanted.round else 0 * disc
-    half = np.maximum(np.where(cut, disc, round_one) - sides, sides - ball).clip(0) / 2
+    wrong: dict[OffBy, Float[np.ndarray, "2"]] = {
+        "cut": np.where(cut, disc - sides, 0),
+        "hidden": round_one - sides,
+        "too large": np.where(sides > _LOOSE * ball, sides - ball, 0),
+    }
+    half = np.max([*wrong.values()], axis=0).clip(0) / 2
+    by = max(wrong, key=lambda cause: wrong[cause].max()) if half.any() else None
     places = calibration.to_table(ends.mean(axis=0) + np.vstack([[0, 0], np.diag(half)]))
-    return np.abs(places[1:] - places[0]).sum(axis=0)
+    return np.abs(places[1:] - places[0]).sum(axis=0), by
 
 
 def _step(picture: Picture) -> float:

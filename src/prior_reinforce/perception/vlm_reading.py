@@ -11,7 +11,7 @@ import json
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -25,6 +25,10 @@ if TYPE_CHECKING:
 
 REACHED_COLOUR = (0, 90, 255)
 GOAL_COLOUR = (200, 0, 160)
+
+OffBy = Literal["cut", "hidden", "too large"]
+"""Why a box's middle may be beside the object's: the picture's border cuts the object, a side is
+too short for a round one, or a side is longer than any of it."""
 
 
 @dataclass(frozen=True)
@@ -56,12 +60,14 @@ class Sighting:
     """Median box of the answers that agree, in pixels of the picture."""
     place: Float[np.ndarray, "2"] | None = None
     """Centre of `box` on the calibrated plane, table frame, in [m]."""
-    off: Float[np.ndarray, "2"] = field(default_factory=lambda: np.zeros(2))
-    """How far `place` may be beside the object's middle, by the box's shape and size, in [m]."""
     problem: str | None = None
     """Why there is no place."""
     unanswered: bool = False
     """Whether that is for want of an answer, and not of a readable one."""
+    off: Float[np.ndarray, "2"] = field(default_factory=lambda: np.zeros(2))
+    """How far `place` may be beside the object's middle, by the box's shape and size, in [m]."""
+    off_by: OffBy | None = None
+    """By what most; None where the box is around the object alone and as a whole."""
 
 
 @dataclass(frozen=True, eq=False)
