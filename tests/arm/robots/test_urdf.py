@@ -390,7 +390,8 @@ RAISED = [
         ({"lift": 0.8}, None),
         ({"lift": 60}, "held at 60 m.* 0 to 0.8 m; in centimetres. .*lift=0.6"),
         ({"lift": 600}, "in millimetres. .*lift=0.6"),
-        ({"lift": -0.2}, "held at -0.2 m.* 0 to 0.8 m$"),
+        ({"lift": 0.9}, "held at 0.9 m.* 0 to 0.8 m; .*--hold lift=0.8$"),
+        ({"lift": -0.2}, "held at -0.2 m.* 0 to 0.8 m; .*--hold lift=0$"),
         ({"lift": 0.4, "a": 90}, "held at 90 rad.* -2.5 to 2.25 rad; in degrees. .*a=1.571"),
         ({"lift": 0.4, "c": 180}, "-6.283 to 6.283 rad; in degrees. .*c=3.142"),
         ({"lift": 0.4, "c": -6.283}, None),
@@ -411,9 +412,23 @@ def test_a_joint_is_held_in_its_own_range(tmp_path, hold, says):
 def test_a_joint_before_the_base_stands_at_0_only_where_that_is_in_its_range(tmp_path):
     path = tmp_path / "arm.urdf"
     path.write_text(Urdf("raised", RAISED).text())
-    with pytest.raises(ConfigurationError, match=r"turntable is held at 0 rad.* 0.5 to 2 rad"):
+    with pytest.raises(
+        ConfigurationError, match=r"turntable.* 0.5 to 2 rad.*--hold turntable=0.5$"
+    ):
         read_urdf(path, "c_link", base="lifted")
     assert read_urdf(path, "c_link", base="lifted", hold={"turntable": 1.0}).joint_names[0] == "a"
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "place"), [(0.1, 0.8, 0.1), (-0.8, -0.3, -0.3), (-1.0, 1.0, 0.0)]
+)
+def test_what_holds_a_lift_is_a_place_in_its_range(tmp_path, low, high, place):
+    path = tmp_path / "arm.urdf"
+    lift = J("lift", "lifted", "prismatic", low=low, high=high)
+    path.write_text(Urdf("raised", [lift, *arm(["a", "b"])]).text())
+    with pytest.raises(FileFormatError, match=f"--hold lift={place:g} if"):
+        read_urdf(path)
+    assert read_urdf(path, hold={"lift": place}).held == {"lift": place}
 
 
 def test_what_is_fixed_behind_the_flange_is_named_where_nothing_says_which_it_is(tmp_path):

@@ -260,7 +260,7 @@ def _refuse_other(
         says = [f"--tip {other[0].parent} for what is before"] * before
         # What carries the arm may stand still; an arm's own joints do not.
         says += [f"--base {other[-1].child} for what is behind it"] * (behind and not before)
-        holds = "--hold " + " ".join(f"{joint.name}=0" for joint in other)
+        holds = "--hold " + " ".join(f"{j.name}={j.nearest(0.0):.4g}" for j in other)
         raise FileFormatError(
             f"{other[-1].name} is {other[-1].type}, and arms of turning joints are known only; say "
             f"{', or '.join([*says, holds])} if it stands still"
@@ -303,8 +303,13 @@ def _upright(before: Sequence[Joint], hold: Mapping[str, float]) -> np.ndarray:
     """
     link = np.eye(3)
     for joint in before:
-        if joint.free and joint.name not in hold:
-            joint.check_held(0.0)
+        stands = joint.nearest(0.0)
+        if joint.free and joint.name not in hold and stands:
+            low, high = joint.places()
+            raise joint.error(
+                f"stands before the base, and its range, {low:.4g} to {high:.4g} rad, is without "
+                f"0; say where in that it stands: --hold {joint.name}={stands:.4g}"
+            )
         link = link @ joint.pose(hold.get(joint.name))[:3, :3]
     if math.hypot(link[0, 2], link[1, 2]) < _ROUNDING and link[2, 2] > 0:
         return np.eye(3)

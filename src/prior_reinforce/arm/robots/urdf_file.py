@@ -186,20 +186,37 @@ class Joint:
             if position:
                 raise self.error(f"is {self.type}, and can be held at 0 alone")
             return
-        turn = 2 * math.pi
-        low, high = (-turn, turn) if self.type == "continuous" else self.ends()
-        if low - _BESIDE <= position <= high + _BESIDE:
+        nearest = self.nearest(position)
+        if nearest == position:
             return
+        low, high = self.places()
         unit, others = ("rad", ["deg"]) if self.type in TURNING else ("m", ["cm", "mm"])
         asked = ""
         for other in others if abs(position) > UNITS[unit].largest else []:
             meant = position * UNITS[other].factor
             if not asked and low <= meant <= high:
-                asked = f"; in {UNITS[other].plural}? then say {self.name}={meant:.4g}"
+                asked = f"; in {UNITS[other].plural}? then say --hold {self.name}={meant:.4g}"
+        asked = asked or f"; say where in that it stands: --hold {self.name}={nearest:.4g}"
         raise self.error(
             f"is held at {position:g} {unit}, and its range is {low:.4g} to {high:.4g} {unit}"
             f"{asked}"
         )
+
+    def places(self) -> tuple[float, float]:
+        """Lowest and highest place at which it can stand still, [rad] or [m]."""
+        if self.type not in (*TURNING, "prismatic"):
+            return 0.0, 0.0
+        turn = 2 * math.pi
+        return (-turn, turn) if self.type == "continuous" else self.ends()
+
+    def nearest(self, position: float) -> float:
+        """Return the place nearest to one, [rad] or [m], at which it can stand still.
+
+        That is the place itself where it is beyond the range by no more than rounding.
+        """
+        low, high = self.places()
+        held = low - _BESIDE <= position <= high + _BESIDE
+        return position if held else min(max(position, low), high)
 
     def pose(self, position: float | None) -> np.ndarray:
         """Pose of the frame behind it in the frame before, 4 x 4, with the joint at 0 or held."""
