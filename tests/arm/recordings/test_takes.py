@@ -185,3 +185,18 @@ def test_an_approach_before_every_throw_is_named_with_what_cuts_it_off(rest, siz
     said = "".join(pauses(takes_of([rest] * 3)))
     assert ("--rests 0.5 --leave-out t0-0 t1-0 t2-0" in said) == told
     assert not [*pauses(takes_of([rest, rest, 0]))]
+
+
+def test_a_throw_before_a_retreat_is_named_by_its_speed():
+    """A wind-up, a rest, a throw of half the time, a rest, and a way to another pose."""
+    rest = np.zeros(40)
+    course = np.concatenate([-0.4 * S, rest - 0.4, 1.4 * S[::2] - 0.4, rest + 1, 1 - 0.6 * S])
+    some = [
+        Recording(
+            f"t{i}", 9 + np.arange(len(course)) / 50, k * course[:, None] * [0.3, 0.4, 0], ARM
+        )
+        for i, k in enumerate((1.0, 1.1))
+    ]
+    (told,) = pauses(some)
+    assert "(t0-1, t1-1)" in told
+    assert "--rests 0.5 --leave-out t0-0 t0-2 t1-0 t1-2 (" in told

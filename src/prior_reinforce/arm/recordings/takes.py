@@ -21,7 +21,7 @@ from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.units import Ambiguity, judge_unit, known_unit, say_names
 from prior_reinforce.arrays import Plans
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
-from prior_reinforce.plans.speeds import largest_of_unit
+from prior_reinforce.plans.speeds import SMOOTHING, largest_of_unit, velocity_profiles
 from prior_reinforce.plans.whole_turns import TURN
 from prior_reinforce.units import base_of, factor, spelt, without_number
 from prior_reinforce.wording import listed
@@ -48,6 +48,8 @@ _REST, _MOST_MOTIONS = 0.5, 3
 pause. Ours."""
 _OWN = 0.2
 """Part of the recording's largest range that a motion of its own has; ours: bumps have less."""
+_AS_FAST = 0.95
+"""Part of the greatest speed from which two motions are equally fast. Ours."""
 
 
 def in_one_unit(
@@ -287,19 +289,27 @@ def several_throws(recording: Recording) -> tuple[Ambiguity, ...]:
 def pauses(recordings: Sequence[Recording]) -> Iterator[str]:
     """Say it if every recording rests between motions, and does not end where it began.
 
-    An approach and a throw do so; of a way back, `all_return` tells.
+    An approach and a throw do so, and a throw and a retreat; the fastest is the likely throw. Of a
+    way back, `all_return` tells.
     """
-    others = list[str]()
+    throws, others = list[str](), list[str]()
     for recording in recordings:
         q, units = recording.positions, [unit or "rad" for unit in recording.units]
         least, parts = _OWN * largest_of_unit(np.ptp(q, axis=0), units), at_rests(recording, _REST)
-        own = [p.episode for p in parts if np.any(np.ptp(p.positions, axis=0) > least)]
+        own = [part for part in parts if np.any(np.ptp(part.positions, axis=0) > least)]
         if len(own) < 2 or _is_at(q[-1], q[0], np.ptp(q, axis=0)):
             return
-        others += [part.episode for part in parts if part.episode != own[-1]]
+        motions = [part.positions for part in own]
+        profiles = velocity_profiles(motions, units, SMOOTHING / recording.period)
+        fastest = np.array([np.linalg.norm(speeds, axis=1).max() for speeds in profiles])
+        # An approach as fast as the throw comes before it.
+        as_fast = np.flatnonzero(fastest >= _AS_FAST * fastest.max())
+        throws.append(own[as_fast[-1]].episode)
+        others += [part.episode for part in parts if part.episode != throws[-1]]
     yield (
-        f"every recording rests for {_REST:g} s or more between motions: if the last alone is the "
-        f"throw, --rests {_REST:g} --leave-out {shlex.join(others)} (if all are: --rests 0)"
+        f"every recording rests for {_REST:g} s or more between motions: if the fastest alone is "
+        f"the throw ({listed(throws)}), --rests {_REST:g} --leave-out {shlex.join(others)} (if "
+        "all are: --rests 0)"
     )
 
 
