@@ -22,8 +22,8 @@ from prior_reinforce.arm.recordings.outcome_units import in_units
 from prior_reinforce.arm.recordings.outcomes import (
     OUTCOMES_FILE,
     Outcomes,
+    beside_tables,
     check_rows,
-    doubts_of_tables,
     in_order,
     outcomes_of,
     read_outcomes,
@@ -278,7 +278,7 @@ class Recordings:
             raise
         if isinstance(given, Mapping):
             return found, ()
-        doubts = doubts_of_tables(own, others, found)
+        found, doubts = beside_tables(found, own, others)
         found, more = in_units(found, wanted.outcome_units, unit)
         return found, doubts + more
 
@@ -336,7 +336,8 @@ class Recordings:
         """
         back = partial(ways_back, selection.recordings)
         seen, sd = outcomes_of(selection.episodes, outcomes, back)  # first, as the rest is slow
-        inspection = inspect(selection, wanted)
+        remarks = (*selection.remarks, *outcomes.remarks)
+        inspection = inspect(replace(selection, remarks=remarks), wanted)
         if inspection.copies:
             raise InvalidDemonstrationsError(inspection.copies)
         units = tuple(wanted.outcome_units or [unit or "m" for unit in outcomes.units])

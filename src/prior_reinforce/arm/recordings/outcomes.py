@@ -94,6 +94,7 @@ class Outcomes:
     """Word in the episodes' names whose number a row may give instead of the one at the end."""
     scale: tuple[float, ...] = ()
     """What each component's numbers were multiplied with."""
+    remarks: tuple[str, ...] = ()
 
     def only(self, names: Sequence[str]) -> Outcomes:
         """Return some of the components, in that order.
@@ -319,17 +320,17 @@ def places_of(episodes: Sequence[str], outcomes: Outcomes) -> dict[str, Place]:
     }
 
 
-def doubts_of_tables(
-    own: Path | None, others: Sequence[Path], found: Outcomes
-) -> tuple[Ambiguity, ...]:
-    """Ask which table is meant where the only one is not called so, or others beside it differ."""
-    unlike = [str(other) for other in others if own is not None and _differs(other, found)]
-    what = f"looks like the table of outcomes, though {', '.join(unlike)} says others"
+def beside_tables(
+    found: Outcomes, own: Path | None, others: Sequence[Path]
+) -> tuple[Outcomes, tuple[Ambiguity, ...]]:
+    """Remark on tables beside their own that differ; ask about an only one not called so."""
     if own is None and len(others) == 1:
-        own, what = others[0], "has a row for each recording: it looks like the table of outcomes"
-    elif not unlike:
-        return ()
-    return (Ambiguity(f"{own} {what}", shlex.join(["--outcomes", str(own)])),)
+        what = f"{others[0]} has a row for each recording: it looks like the table of outcomes"
+        return found, (Ambiguity(what, shlex.join(["--outcomes", str(others[0])])),)
+    unlike = [str(other) for other in others if own is not None and _differs(other, found)]
+    said = "has other numbers for these recordings: if it is meant,"
+    each = (f"{other} {said} {shlex.join(['--outcomes', other])}" for other in unlike)
+    return replace(found, remarks=(*each,)), ()
 
 
 def _differs(path: Path, outcomes: Outcomes) -> bool:
