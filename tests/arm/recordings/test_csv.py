@@ -601,3 +601,14 @@ def test_a_file_that_is_no_recording_is_refused_with_what_leaves_it_out(tmp_path
     assert "--leave-out calibration" in str(refused.value)
     kept = import_demonstrations(tmp_path, joints=JOINTS, leave_out=["calibration"])
     assert kept.demonstrations.n == N
+
+
+def test_what_is_wrong_in_every_file_leaves_none_out(tmp_path):
+    for i in range(2):
+        rows = [f"{k / 10},{k / 20},{k / 30}" for k in range(20)]
+        (tmp_path / f"throw_{i}.csv").write_text("\n".join(["t,left_elbow,right_elbow", *rows]))
+    with pytest.raises(InvalidDemonstrationsError, match=r"--joints$"):
+        read_recordings(tmp_path, joints=["elbow"])
+    (tmp_path / "throw_1.csv").write_text("\n".join(["t,elbow,wrist", *rows]))
+    with pytest.raises(InvalidDemonstrationsError, match=r"--leave-out throw_0$"):
+        read_recordings(tmp_path, joints=["elbow"])

@@ -115,3 +115,13 @@ def test_velocities_are_not_taken_for_positions():
         select(recordings, joints, joints)
     with pytest.raises(ConfigurationError, match="dq_0 to dq_1 look like velocities"):
         select(recordings, own, joints, plan_units=("rad", "rad"))
+
+
+def test_a_recording_is_to_be_left_out_only_where_another_has_the_joints():
+    two, clear = ("left_elbow", "right_elbow"), ("wrist", "elbow")
+    unclear = [Recording(f"t{i}", T, recording().positions, two) for i in range(2)]
+    with pytest.raises(InvalidDemonstrationsError, match=r"--joints$"):
+        select(unclear, ["elbow"])
+    one = Recording("t2", T, recording().positions, clear)
+    with pytest.raises(InvalidDemonstrationsError, match=r"--joints; .*--leave-out t0$"):
+        select([*unclear, one], ["elbow"])

@@ -63,6 +63,8 @@ _ABSENT = 9e9
 """What ABB writes for the position of an axis that is not there."""
 _MOST_WORDS = 8
 """Texts between which a column switches. Ours."""
+_FEW_FILES = 4
+"""Files of a folder that are read again to tell whether one is unlike. Ours."""
 _ECHOED = ("name", "position", "velocity", "effort")
 """Arrays of a sensor_msgs/JointState, in order."""
 _SECOND = 10**9
@@ -97,8 +99,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         if len(paths) > 1 and path.stem in (options.leave_out or ()):
             yield path.stem, unread
             continue
-        guarded = partial(or_leave_out, path.stem, among_others=len(paths) > 1)
-        with guarded():
+        with or_leave_out(path.stem, lambda: len(paths) > 1):
             table = read_table(path, options.delimiter, options.decimal)
             if len(paths) > 1 and _has_a_row_each(table, stems):
                 continue
@@ -116,7 +117,19 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         for episode in sorted({*names} - {""} or {""}, key=natural_order):
             own = table.rows([i for i, name in enumerate(names) if name == episode])
             how = episode, options, column, guessed, said, remarks
-            yield episode, guarded()(partial(_episode, own, *how))
+            guarded = or_leave_out(path.stem, partial(_has_other_columns, path, paths, options))
+            yield episode, guarded(partial(_episode, own, *how))
+
+
+def _has_other_columns(path: Path, paths: Sequence[Path], options: ReadOptions) -> bool:
+    """Whether a file has other columns than one of the first files beside it."""
+
+    def columns(of: Path) -> tuple[str, ...]:
+        with contextlib.suppress(FileFormatError):
+            return read_table(of, options.delimiter, options.decimal).names
+        return ()
+
+    return any(columns(path) != columns(other) for other in paths[:_FEW_FILES])
 
 
 def tables_of_outcomes(source: Path, there: Sequence[str]) -> list[Path]:

@@ -253,12 +253,12 @@ def named_damage(path: Path, what: str) -> Iterator[None]:
 
 
 @contextmanager
-def or_leave_out(episode: str, *, among_others: bool) -> Iterator[None]:
-    """Add to what is said against a file that others beside it do without that one."""
+def or_leave_out(episode: str, differs: Callable[[], bool]) -> Iterator[None]:
+    """Add to what is said against a file that differs from those beside it: it may be left out."""
     try:
         yield
     except (FileFormatError, InvalidDemonstrationsError) as error:
-        if not among_others or "--leave-out" in str(error):
+        if "--leave-out" in str(error) or not differs():
             raise
         what = f"{error}; or if that is no recording, --leave-out {shlex.quote(episode)}"
         raise type(error)(what) from error

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -109,10 +110,9 @@ def select(
         )
     joints, guessed = _guess_names(recordings[0], joints) if unnamed else (joints, ())
     _refuse_places(joints, names, plan_units)
-    columns = []
+    columns, others = [], any(r.named and _holds(r, joints) for r in recordings)
     for recording in recordings:
-        others = any(find_channels(joints, r.names) for r in recordings if r.named)
-        with or_leave_out(recording.episode, among_others=others):
+        with or_leave_out(recording.episode, lambda: others):
             columns.append(_columns(recording, joints, names, plan_units))
     if given == "each" and not recordings[0].named:
         stated = [stated[i] for i in find_channels(names, joints) or range(len(joints))]
@@ -218,6 +218,13 @@ def _doubt_first(columns: Sequence[str], moving: Sequence[str]) -> tuple[Ambigui
         f"{shlex.join([zero, *columns[:-1]])}; or the names are the plan's, from 1"
     )
     return (Ambiguity(what, f"--joints {shlex.join(columns)}"),)
+
+
+def _holds(recording: Recording, joints: tuple[str, ...]) -> bool:
+    """Whether it is clear which of its channels are the joints."""
+    with suppress(InvalidDemonstrationsError):
+        return find_channels(joints, recording.names) is not None
+    return False
 
 
 def _columns(
