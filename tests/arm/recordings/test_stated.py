@@ -118,3 +118,8 @@ def test_truth_values_are_no_motion():
     arrays = {"q": np.zeros((20, 6)), "gripper": np.zeros(20, dtype=bool)}
     with pytest.raises(FileFormatError, match=r"gripper of shape .* bool"):
         motion_keys("a.npz", ReadOptions(key=("q", "gripper")), arrays, ("q",))
+
+
+def test_an_only_array_that_is_called_an_outcome_is_named_as_what_may_be_the_motion():
+    with pytest.raises(FileFormatError, match=r"\['landing_q'\].*--key"):
+        motion_keys("a.npz", ReadOptions(), {"landing_q": Q}, ("q",))

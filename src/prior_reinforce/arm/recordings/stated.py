@@ -78,9 +78,8 @@ def motion_keys(
     """
     shapes = {name: own.shape for name, own in arrays.items() if own.dtype.kind in "fiu"}
     single = [name for name, shape in shapes.items() if len(shape) == 1]
-    there = sorted(
-        n for n, s in shapes.items() if 2 <= len(s) <= most and not _OUTCOME.fullmatch(n)
-    )
+    fit = sorted(name for name, shape in shapes.items() if 2 <= len(shape) <= most)
+    there = [name for name in fit if not _OUTCOME.fullmatch(name)]
     keys = options.key or tuple(name for name in usual if name in shapes)[:1]
     keys = keys or tuple(single[i] for i in find_channels(options.joints or (), single) or ())
     keys = keys or tuple(there if len(there) == 1 and not says_no_position(there[0]) else ())
@@ -92,7 +91,7 @@ def motion_keys(
                 has = f"{key} of shape {arrays[key].shape} and type {arrays[key].dtype}"
             raise FileFormatError(
                 f"{where} has {has} (expected numbers of shape (T, D)"
-                f"{' or (N, T, D)' * (most > 2)}); it holds {there}: say which with --key"
+                f"{' or (N, T, D)' * (most > 2)}); it holds {there or fit}: say which with --key"
             )
     return keys
 
