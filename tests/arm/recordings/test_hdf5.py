@@ -352,3 +352,31 @@ def test_fields_of_records_are_read_as_arrays_are(tmp_path):
         file["data/demo_0/other"] = records
     (read,) = read_recordings(tmp_path, key=tuple(f"log.{name}" for name in JOINTS), rate=50)
     np.testing.assert_allclose(read.positions, np.rad2deg(q))
+
+
+def test_only_a_demonstration_declares_its_own_samples(tmp_path):
+    path = write_robomimic(tmp_path)
+    with h5py.File(path, "a") as file:
+        file["data"].attrs["num_samples"] = 10_000  # of all of them
+    assert len(read_recordings(path)) == 6
+
+
+def test_a_record_beside_the_motion_may_be_of_any_size(tmp_path):
+    with h5py.File(tmp_path / "0.h5", "w") as file:
+        rows = [(t, tuple(q)) for t, q in zip(T, Q, strict=True)]
+        file["log"] = np.array(rows, dtype=[("time", "f8"), ("position", "f8", (7,))])
+        points = [("x", "f4"), ("y", "f4"), ("z", "f4"), ("rgb", "u4")]
+        file.create_dataset("points", (30_000_000,), points, chunks=(1000,))
+        picture = [("picture", "u1", (480, 640, 3)), ("exposure", "f8")]
+        file.create_dataset("camera", (len(T),), picture, chunks=(1,))
+    (read,) = read_recordings(tmp_path, key="position")
+    np.testing.assert_array_equal(read.positions, Q)
+    np.testing.assert_allclose(read.times, T)
+
+
+def test_a_record_that_is_the_motion_is_held_to_the_largest_size(tmp_path):
+    with h5py.File(tmp_path / "0.h5", "w") as file:
+        kind = [("time", "f8"), ("position", "f8", (7,))]
+        file.create_dataset("log", (30_000_000,), kind, chunks=(1000,))
+    with pytest.raises(FileFormatError, match="no recording of throws"):
+        read_recordings(tmp_path, key="position")

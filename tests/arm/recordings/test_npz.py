@@ -349,3 +349,9 @@ def test_outcomes_are_not_taken_for_the_motion_that_is_missing(tmp_path):
     np.savez(tmp_path / "a.npz", dt=0.01, outcome=np.arange(6.0)[:, None] ** [1, 2])
     with pytest.raises(FileFormatError, match=r"no array q.*--key"):
         read_recordings(tmp_path)
+
+
+def test_a_total_of_samples_is_no_length_of_an_episode(tmp_path):
+    q = np.cumsum(np.full((5, 100, 7), 0.01), axis=1)
+    np.savez(tmp_path / "all.npz", q=q, t=0.02 * np.arange(100), num_samples=500)
+    assert len(read_recordings(tmp_path / "all.npz")) == 5

@@ -28,7 +28,12 @@ from prior_reinforce.arm.recordings.recording import (
     named_damage,
     natural_order,
 )
-from prior_reinforce.arm.recordings.stated import by_field, motion_keys, recorded_among
+from prior_reinforce.arm.recordings.stated import (
+    by_field,
+    motion_keys,
+    other_count,
+    recorded_among,
+)
 from prior_reinforce.arm.recordings.time_finder import Stamps
 from prior_reinforce.errors import FileFormatError
 
@@ -62,12 +67,25 @@ def read(source: Path, options: ReadOptions) -> Episodes:
                 yield name, partial(_demo, path, top, within, options, name)
 
 
+class _Field:
+    """A field of a record, read by itself: a record beside the motion may be of any size."""
+
+    def __init__(self, record: Any, name: str) -> None:
+        own = record.dtype[name]
+        self.record, self.name, self.attrs = record, name, record.attrs
+        self.dtype, self.shape = own.base, (*record.shape, *own.shape)
+        # A chunk is of the whole record.
+        each = math.ceil(record.dtype.itemsize / own.base.itemsize)
+        self.chunks = (*record.chunks, each) if record.chunks else None
+
+    def __getitem__(self, at: Any) -> Any:
+        return self.record.fields(self.name)[at]
+
+
 def _demo(path: Path, top: Any, within: str, options: ReadOptions, episode: str) -> Recording:
     with named_damage(path, "HDF5"):
         group = _own(path, top, within)
-        raw = _arrays_in(path, group, options.key or _KEYS)
-        read = {n: _numbers(path, n, own) if own.dtype.names else own for n, own in raw.items()}
-        found = by_field(read)
+        found = by_field(_arrays_in(path, group, options.key or _KEYS), _Field)
         keys = motion_keys(f"{path}: {group.name}", options, found, _KEYS)
         numbers = {name: own for name, own in found.items() if own.dtype.kind in "biuf"}
         shapes = {name: own.shape for name, own in numbers.items() if own.shape}
@@ -83,8 +101,14 @@ def _demo(path: Path, top: Any, within: str, options: ReadOptions, episode: str)
                 and (math.prod(own) == count or may_move(name, math.prod(own[1:])))
             )
         }
-        of_record = (n for n in raw if key.removeprefix(f"{n}.") in (raw[n].dtype.names or ()))
-        texts, stated = _said(top, group, raw[key if key in raw else next(of_record)])
+        of_key = found[key]
+        texts, stated = _said(top, group, of_key.record if isinstance(of_key, _Field) else of_key)
+        # By robomimic the frames of this very demonstration; elsewhere it may be a total.
+        declared = stated.get("num_samples", count)
+        if "num_samples" in group.attrs and np.any(declared > count):
+            raise other_count(
+                f"{path}: {episode}", f"{declared} samples by num_samples", key, count
+            )
     return recorded_among(path, episode, keys, there, options, texts=texts, stated=stated)
 
 
@@ -146,8 +170,6 @@ def _arrays_in(path: Path, group: Any, keys: Sequence[str]) -> dict[str, Any]:
 
 def _numbers(path: Path, name: str, found: Any) -> Stamps:
     """The numbers of an array, unpacked, unless its header claims more than a recording has."""
-    if isinstance(found, np.ndarray):  # a field of a record, which was read whole
-        return found
     for what, shape in ((name, found.shape), (f"a chunk of {name}", found.chunks or ())):
         check_numbers(path, what, shape, found.dtype.itemsize)
     numbers = np.asarray(found[()])

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from operator import getitem
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -54,12 +55,14 @@ _MOST_SAID = 1_000_000
 """Bytes of a JSON beside a table at most. Ours: it says what the columns are."""
 
 
-def by_field(arrays: Mapping[str, Any]) -> dict[str, Any]:
+def by_field(
+    arrays: Mapping[str, Any], field_of: Callable[[Any, str], Any] = getitem
+) -> dict[str, Any]:
     """Return arrays with each field of a record by itself, by the field's name."""
     fields = [(name, field) for name, own in arrays.items() for field in own.dtype.names or ()]
     twice = len({field for _, field in fields} | arrays.keys()) < len(fields) + len(arrays)
     plain = {name: own for name, own in arrays.items() if not own.dtype.names}
-    return plain | {f"{n}.{f}" if twice else f: arrays[n][f] for n, f in fields}
+    return plain | {f"{n}.{f}" if twice else f: field_of(arrays[n], f) for n, f in fields}
 
 
 def motion_keys(
@@ -270,6 +273,14 @@ def headed(table: Table, joints: Sequence[str] | None = None) -> Table:
     return replace(table, names=names, units=units, named=True)
 
 
+def other_count(where: str, declared: str, key: str, count: int) -> FileFormatError:
+    """Return what to raise where an episode declares another number of frames than it holds."""
+    return FileFormatError(
+        f"{where} declares {declared} but {key} holds {count}; copy the file again, or leave that "
+        "episode out"
+    )
+
+
 def frames_said(
     where: str, key: str, stated: Mapping[str, Any], count: int
 ) -> tuple[int, tuple[str, ...]]:
@@ -289,12 +300,8 @@ def frames_said(
         elif _FRAMES.fullmatch(own) and numbers.size == 1 and numbers.dtype.kind in "iu":
             n = int(numbers.reshape(()))
             rest = np.nan_to_num(np.asarray(stated[key], dtype=float)[n:])
-            lacks = own == "num_samples" and n > count  # robomimic's, of this very episode
-            if lacks or (0 < n < count and np.any(np.diff(rest, axis=0))):
-                raise FileFormatError(
-                    f"{where} declares {n} samples by {name} but {key} holds {count}; copy the "
-                    "file again, or leave that episode out"
-                )
+            if 0 < n < count and np.any(np.diff(rest, axis=0)):
+                raise other_count(where, f"{n} samples by {name}", key, count)
         if 1 < n < kept:
             found, kept = name, n
     remark = f"{count - kept} frames at the end left out, which are padding by {found}"
