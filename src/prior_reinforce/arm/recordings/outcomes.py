@@ -63,7 +63,6 @@ _SEMICOLONS = "semicolons, where a comma is the decimal sign"
 SOURCE = "source"
 _NOT_COMPONENTS = (SD, SOURCE, "note", "notes", "comment", "comments")
 
-
 Place = tuple[float, ...]
 """The components of an outcome, and their standard deviation."""
 
@@ -95,6 +94,7 @@ class Outcomes:
     scale: tuple[float, ...] = ()
     """What each component's numbers were multiplied with."""
     remarks: tuple[str, ...] = ()
+    """Warnings for a person."""
 
     def only(self, names: Sequence[str]) -> Outcomes:
         """Return some of the components, in that order.
