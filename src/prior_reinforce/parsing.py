@@ -152,10 +152,12 @@ def _reading(terms: dict[int, _Term], text: str, form: OutcomeFormat, somewhere:
 
 def _refuse_too_large(number: float, unit: str, text: str, *, stated: bool) -> None:
     """Refuse an error that no arm makes, or an angle that may be in a unit that was not stated."""
-    base = "m" if kind_of(unit) == "length" else unit
-    stated = stated and base != "m"  # 6 m long is a slip of 6 cm, whatever was said
-    if said := looks_like(base, number * (factor(unit, base) or 1.0), stated=stated):
-        again = f"say it again, in {said}" if stated else f"say its unit, {said} or {unit}"
+    is_length = kind_of(unit) == "length"  # 6 m long is a slip of 6 cm, whatever was said
+    base = "m" if is_length else unit
+    size = number * (factor(unit, base) or 1.0)
+    if said := looks_like(base, size, stated=stated and not is_length):
+        known = stated or is_length
+        again = f"say it again, in {said}" if known else f"say its unit, {said} or {unit}"
         raise InvalidFeedbackError(
             f"{text!r}: {say_too_large(number, unit, stated)}; {again}, or void the trial if that "
             "is true"
