@@ -377,9 +377,9 @@ def _off(
         "too large": np.where(sides > _LOOSE * ball, sides - ball, 0),
     }
     half = np.max([*wrong.values()], axis=0).clip(0) / 2
-    by = max(wrong, key=lambda cause: wrong[cause].max()) if half.any() else None
+    worst: OffBy = max(wrong, key=lambda cause: float(wrong[cause].max()))
     places = calibration.to_table(ends.mean(axis=0) + np.vstack([[0, 0], np.diag(half)]))
-    return np.abs(places[1:] - places[0]).sum(axis=0), by
+    return np.abs(places[1:] - places[0]).sum(axis=0), worst if half.any() else None
 
 
 def _step(picture: Picture) -> float:
