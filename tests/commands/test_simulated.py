@@ -157,12 +157,12 @@ def test_without_a_terminal_a_failed_reading_ends_in_one_line(adapt, tmp_path, c
 
 
 def test_at_a_terminal_the_operator_is_asked_until_it_is_understood(adapt, typed, capsys, nobody):
-    typed("a little long\n5cm long, 2cm left\n" + "hit\n" * 9)
+    typed("a hair long\n5cm long, 2cm left\n" + "hit\n" * 9)
     status = adapt(*nobody)
     said = capsys.readouterr().out
     assert status in (0, 1)
     assert "not seen: looking for the orange ball: cannot reach" in said
-    assert "cannot read 'a little long'" in said
+    assert "cannot read 'a hair long'" in said
     assert "seen: 5 cm long, 2 cm left" in said or "seen: HIT" in said
 
 
