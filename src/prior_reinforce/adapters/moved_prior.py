@@ -29,8 +29,8 @@ _HOW_CLOSELY = ((1.0, 1.0, 0.45), (_CLOSELY, _CLOSELY, 0.33), (1.0, _CLOSELY, 0.
 where the symmetry holds. Offsets may be small (a simulated arm, or one that was measured today),
 and the law of another task still unknown: so a first hit nearby does not make a far goal look sure.
 Where offsets are not small the law is not known either: else a first miss that comes of changed
-hardware would be blamed on it (V3: 0.3 trials more). Ours, by P(hit) on the zoo's development tasks
-and on worlds of drawn laws and offsets."""
+hardware would be blamed on it. Ours: that all may be small, by P(hit) on the zoo's development
+tasks; the shares, by drawn laws and offsets (reproduction/benchmarks/drawn_laws.py)."""
 _ANY_GAIN, _ANY_BEND = 0.8, 3.0
 """Where there is no symmetry: least sd of every entry of G, and how much more the law bends."""
 _REMEMBERED = 4

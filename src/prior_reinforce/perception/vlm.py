@@ -370,10 +370,10 @@ def _off(
     sides, disc, ball = _sides(box, calibration, wanted.size)
     ends, border = np.reshape(box, (2, 2)), np.array(picture.shape[1::-1]) - _step(picture)
     cut = (ends[0] <= _step(picture)) | (ends[1] >= border)
-    round_one = min((sides / disc).max(), 1.0) * disc if wanted.round else 0 * disc
+    whole = min((sides / disc).max(), 1.0) * disc  # as large as the longer side says
     wrong: dict[OffBy, Float[np.ndarray, "2"]] = {
         "cut": np.where(cut, disc - sides, 0),
-        "hidden": round_one - sides,
+        "hidden": np.where(wanted.round, whole - sides, 0),
         "too large": np.where(sides > _LOOSE * ball, sides - ball, 0),
     }
     half = np.max([*wrong.values()], axis=0).clip(0) / 2
