@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.errors import (
+    ConfigurationError,
     FileFormatError,
     InvalidDemonstrationsError,
     InvalidGoalError,
@@ -297,6 +298,15 @@ def test_a_symmetry_is_part_of_the_fingerprint_and_can_be_taken_off():
 def test_a_symmetry_that_does_not_fit_is_refused(symmetry, message):
     with pytest.raises(InvalidDemonstrationsError, match=message):
         make(symmetry=symmetry)
+
+
+def test_a_motion_is_turned_in_metres_alone():
+    """A place in metres among outcomes in centimetres would move plans by metres."""
+    centimetres = OutcomeFormat(("x", "y"), ("cm", "cm"), (1.5, 1.5))
+    with pytest.raises(ConfigurationError, match=r"outcomes are in cm.* write units m"):
+        make(symmetry=TURN, outcome_format=centimetres)
+    with pytest.raises(ConfigurationError, match="outcomes are in cm"):
+        make(outcome_format=centimetres).with_symmetry(TURN)
 
 
 def test_one_demonstration_has_the_spread_of_its_symmetry():

@@ -406,6 +406,7 @@ class Demonstrations:
                 f"the symmetry {symmetry.name!r} moves columns that plans do not have; they have "
                 f"{self.action_dim}: {', '.join(self.format.names)}"
             )
+        symmetry.check_units(self.outcome_format.units)
         return symmetry.around(self.outcomes_seen)
 
     def _oddities(self, *, unit_stated: bool) -> Iterator[str]:

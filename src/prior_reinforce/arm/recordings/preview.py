@@ -22,7 +22,6 @@ from prior_reinforce.generators.timing.events import find_transitions
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.symmetry import Polar, hand_paths
 from prior_reinforce.terminal import plain
-from prior_reinforce.units import factor
 from prior_reinforce.wording import axes_of, in_words
 
 if TYPE_CHECKING:
@@ -99,12 +98,11 @@ class Preview:
         if paths is None:
             return  # carried by an arm that does not stand at the origin
         nearest = np.linalg.norm(paths - chart.centre, axis=-1).min(axis=1)
-        unit = demos.outcome_format.units[0]
-        far = np.flatnonzero(nearest * (factor(unit, "m") or 1.0) > _AT_THE_PLACE)
+        far = np.flatnonzero(nearest > _AT_THE_PLACE)
         if far.size:
             (x, y), where = chart.centre, say_names([self.episodes[i] for i in far])
             yield (
-                f"the hand comes no nearer than {nearest[far].min():.3g} {unit} to ({x:g}, {y:g}), "
+                f"the hand comes no nearer than {nearest[far].min():.3g} m to ({x:g}, {y:g}), "
                 f"where the object is said to lie, in {where}: see [symmetry] object, whether it "
                 "is counted in the arm's base frame, and for a long tool [gate] tool_tip"
             )

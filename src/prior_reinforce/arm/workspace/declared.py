@@ -11,7 +11,6 @@ from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.symmetry import Symmetry, declare_symmetry
-from prior_reinforce.units import factor
 
 WAYS = {
     "carried": "the arm carries the object until it leaves: turned about the base",
@@ -52,13 +51,6 @@ class DeclaredSymmetry(Struct, frozen=True, forbid_unknown_fields=True):
             ConfigurationError: Plans or outcomes are not such that this can be done.
         """
         about: Literal["base"] | tuple[float, float] | None = None
-        lengths = [u for u in outcomes.units[:2] if factor(u, "m") not in (None, 1.0)]
-        if lengths and self.object != "none":  # else nothing but the outcome has a length
-            raise ConfigurationError(
-                f"outcomes are in {lengths[0]}, and a motion is turned or shifted in the metres of "
-                "the table; write units m, and the tolerance in m ([outcome], --outcome-units): "
-                "tables in other units are converted, and trials may be told in any"
-            )
         if self.turns:
             about = "base" if isinstance(self.object, str) else self.object
         joints: list[int] = []
@@ -72,7 +64,7 @@ class DeclaredSymmetry(Struct, frozen=True, forbid_unknown_fields=True):
                     f"a symmetry needs all joints of {robot.robot} in the plan, which has "
                     f"{', '.join(form.names)}; take [symmetry] out"
                 )
-        return declare_symmetry(
+        symmetry = declare_symmetry(
             form,
             outcomes.outcome_dim,
             about=about,
@@ -84,6 +76,8 @@ class DeclaredSymmetry(Struct, frozen=True, forbid_unknown_fields=True):
             release_frame=self.release_frame,
             steps=self.steps,
         )
+        symmetry.check_units(outcomes.units)
+        return symmetry
 
 
 def read_object(said: str) -> str | tuple[float, float]:

@@ -9,7 +9,7 @@ take it back: every belief about G is a prior.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,6 +21,7 @@ from prior_reinforce.arrays import Frames, Point, Points
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.symmetry.charts import AnyChart, Cartesian, LogDistance, Polar
 from prior_reinforce.plans.symmetry.moves import AnyMove, Learned, Moved, Shift, Tempo
+from prior_reinforce.units import factor
 
 Matrix = Float[np.ndarray, "k k"]
 EXTRAPOLATED = 0.5
@@ -107,6 +108,21 @@ class Symmetry:
     def clocked(self) -> bool:
         """Whether a clock releases, as its tempo says."""
         return any(isinstance(move, Tempo) and move.keep_horizon for move in self.moves)
+
+    def check_units(self, units: Sequence[str]) -> None:
+        """Hold it against the units of outcomes: what is turned or shifted is in metres.
+
+        Raises:
+            ConfigurationError: They are of another length, of which a turn about a place in metres
+                gives another motion than is meant.
+        """
+        lengths = [unit for unit in units[:2] if factor(unit, "m") not in (None, 1.0)]
+        if lengths and not isinstance(self.chart, LogDistance):  # which has no place
+            raise ConfigurationError(
+                f"outcomes are in {lengths[0]}, and a motion is turned or shifted in the metres of "
+                "the table; write units m, and the tolerance in m ([outcome], --outcome-units): "
+                "tables in other units are converted, and trials may be told in any"
+            )
 
     def farthest_from(self, z: Points) -> Point:
         """How far aims beyond the demonstrated range are believed, in each component.
