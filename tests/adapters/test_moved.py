@@ -106,7 +106,17 @@ def test_what_works_the_other_way_is_found_and_said():
     assert arm.trials(GOALS[2]) <= 5
     assert arm.adapter.symmetry_odds["the other way"] > 0.9
     assert arm.adapter.symmetry_doubted
-    assert "other way round" in arm.adapter.expect(GOALS[0], GOALS[0], 0.015).remark
+    said = arm.adapter.expect(GOALS[0], GOALS[0], 0.015).remark
+    assert "other way round" in said
+    assert "auto,symmetry=none" not in said  # one demonstration alone says nothing of other goals
+
+
+def test_where_several_demonstrations_say_more_than_their_symmetry_that_is_the_remedy():
+    arm, goal = Arm([[-0.9, 0.0], [0.0, 1.0]], shown=demonstrations(FOUR)), np.array([1.5, 0.1])
+    arm.throw(goal)
+    said = arm.adapter.expect(goal, goal, 0.015).remark
+    assert "the other way round" in said
+    assert "auto,symmetry=none" in said
 
 
 def test_two_words_on_either_side_of_the_goal_speak_for_no_other_model():

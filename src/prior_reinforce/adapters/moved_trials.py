@@ -157,10 +157,15 @@ class MovedTrials:
                 f"the goal is {beyond} than the demonstration can be moved ({symmetry.name}); "
                 "demonstrate nearer to it"
             )
+        several = len(belief.prior.anchors.z) > symmetry.k
+        instead = "; a model of the demonstrations alone: generator auto,symmetry=none" * several
         if model.name == OTHER_WAY:
-            return f"outcomes follow the symmetry ({symmetry.name}) the other way round"
+            return f"outcomes follow the symmetry ({symmetry.name}) the other way round{instead}"
         if self.doubted:
-            return f"outcomes do not follow the symmetry ({symmetry.name}): is it the right one?"
+            return (
+                f"outcomes do not follow the symmetry ({symmetry.name}): is it the right one?"
+                f"{instead}"
+            )
         found = [change.since for change in belief.hypotheses[0].changes if change.shift_sd]
         if found:  # others were announced; those that were lost have no number here
             n = self.now - found[-1]

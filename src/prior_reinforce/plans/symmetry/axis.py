@@ -69,7 +69,7 @@ class Axis:
             "differ by"
         )
         if self.doubted:
-            return f"WARNING: {said}: is the axis right? see [symmetry] about"
+            return f"WARNING: {said}: is the axis right? see [symmetry] object"
         few = "; so few tell it roughly" if self.n < _TOLD_BY else ""
         return f"axis: {said}{few}"
 
