@@ -24,10 +24,10 @@ from prior_reinforce.generators import make_generator
 from prior_reinforce.perception import make_perception
 from prior_reinforce.simulation.protocol import is_hit, perceive_demonstrations
 from prior_reinforce.simulation.tasks import make_task
+from reproduction.demonstrations import DRAWN, prior_set
 from reproduction.statistics import bootstrap_mean
 
 TASKS = ("basketball-v1", "curling", "fishing")
-SETS = tuple(f"v{number:02}" for number in range(20))
 FEWEST = 50
 """Throws in a bin that is shown."""
 
@@ -37,7 +37,7 @@ def thrown(
 ) -> tuple[list[np.ndarray], np.ndarray]:
     """P(hit) said under each probability of changed hardware, and which throws hit."""
     task, key = make_task(name), arguments.sets[number]
-    seed, prior = arguments.seed + number, task.demonstrations(key).without_symmetry()
+    seed, prior = arguments.seed + number, prior_set(task, key)
     if arguments.perception != "exact":
         perception = make_perception(arguments.perception)
         prior = perceive_demonstrations(task, prior, perception, seed=seed)
@@ -58,7 +58,7 @@ def main() -> None:
     """Print a table for each probability of changed hardware."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--tasks", nargs="+", default=TASKS)
-    parser.add_argument("--sets", nargs="+", default=SETS)
+    parser.add_argument("--sets", nargs="+", default=DRAWN)
     parser.add_argument("--goals", type=int, default=40)
     parser.add_argument("--perception", choices=("eye", "exact"), default="eye")
     parser.add_argument("--generator", default="interpolation,timing=align")

@@ -1,4 +1,4 @@
-"""Two of the scripts of `benchmarks/`, as a reader runs them."""
+"""Some of the scripts of `benchmarks/`, as a reader runs them."""
 
 import re
 import runpy
@@ -57,3 +57,11 @@ def test_first_throws_of_a_method_are_a_row_a_set(printed):
     _, text = printed("zero_shot", "--methods", "nearest,timing=align", "--goals", "4")
     rows = re.findall(r"^\| nearest,timing=align \| ([AB]) \| [\d.]+ \(", text, re.MULTILINE)
     assert rows == ["A", "B"]
+
+
+@pytest.mark.slow
+def test_what_is_said_of_first_throws_stands_beside_what_hit_on_drawn_sets(printed):
+    options = ["--tasks", "fishing", "--sets", "v00", "v01", "--goals", "3", "--p-changed", "0.2"]
+    _, text = printed("first_throws", *options, "--perception", "exact")
+    assert re.search(r"^\| fishing \| 0\.\d\d \| [01]\.\d\d \|", text, re.MULTILINE)
+    assert "6 throws" in text
