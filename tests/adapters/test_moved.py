@@ -17,6 +17,7 @@ from prior_reinforce.plans.symmetry import (
     Symmetry,
     Tempo,
     TurnJoint,
+    scale_alone,
     shift,
     turn_and_scale,
 )
@@ -352,6 +353,38 @@ def test_no_condition_that_missed_by_so_much_is_asked_again():
         arm.adapter.observe(tried[-1], goal, reading.within(TOLERANCE))
     apart = np.linalg.norm(np.array(tried)[:, None] - tried, axis=2)
     assert apart[np.triu_indices(8, 1)].min() > 0.4 * TOLERANCE[0]
+
+
+def one_number(gain):
+    """An arm of one outcome, which makes it larger or smaller by how fast it moves."""
+    amount = OutcomeFormat(("amount",), ("ml",))
+    shown = demonstrations(np.array([[100.0]]), scale_alone(), outcome_format=amount)
+    arm = Arm([[gain]], off=[0.0], shown=shown)
+    arm.moved = np.zeros(1)
+    return arm
+
+
+def test_no_plan_is_moved_farther_than_it_may_be_to_try_another():
+    arm, goal = one_number(-0.55), np.array([190.0])  # faster is less: 1.64 times is the most
+    farthest = arm.shown.symmetry.farthest
+    for _ in range(8):
+        condition = arm.adapter.propose(goal)
+        assert np.all(
+            np.abs(arm.prior.moved(arm.shown.symmetry.chart.to(condition[None]))) <= farthest + 1e-6
+        )
+        reading = Reading.measured(arm.lands(condition) - goal, 1.0, hit=False)
+        arm.adapter.observe(condition, goal, reading.within(np.array([6.0])))
+
+
+@pytest.mark.parametrize(("goal", "word"), [(190.0, "farther"), (50.0, "nearer")])
+def test_a_goal_that_less_speed_would_reach_is_not_called_nearer_for_it(goal, word):
+    arm, goal = one_number(-0.55), np.array([goal])
+    for _ in range(4):
+        condition = arm.adapter.propose(goal)
+        reading = Reading.measured(arm.lands(condition) - goal, 1.0, hit=False)
+        arm.adapter.observe(condition, goal, reading.within(np.array([6.0])))
+    said = arm.adapter.expect(arm.adapter.propose(goal), goal, np.array([6.0])).remark
+    assert f"the goal is {word} than" in said
 
 
 def test_a_change_is_named_by_how_many_outcomes_lie_elsewhere_unless_it_was_announced():

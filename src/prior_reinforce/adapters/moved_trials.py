@@ -180,12 +180,14 @@ class MovedTrials:
         belief, symmetry = self.belief, self.belief.symmetry
         aim = belief.aim(goal, self.now, self._farthest(self._losses(goal)))
         w = belief.prior.moved(aim[None])[0]
-        there = belief.outcomes(0, self._places(self.chart.back(aim)[None], goal[None]))
+        mean = belief.outcomes(0, self._places(self.chart.back(aim)[None], goal[None])).mean[0]
         ends = np.abs(w) >= (1.0 - 1e-6) * symmetry.farthest
-        if not np.any(ends) or np.linalg.norm(there.mean[0] - goal) <= np.linalg.norm(self._noise):
+        tolerance = np.linalg.norm(self._noise) / OF_TOLERANCE
+        if not np.any(ends) or np.linalg.norm(mean - goal) <= tolerance:
             return ""
         distance = isinstance(self.chart, (Polar, LogDistance))
-        return "nearer" if distance and ends[0] and w[0] < 0.0 else "farther"
+        short = self.chart.to(goal)[0] > self.chart.to(mean)[0]
+        return "nearer" if distance and ends[0] and not short else "farther"
 
     @property
     def _noise(self) -> Point:
@@ -246,12 +248,22 @@ class MovedTrials:
         return memory.only(of_goal & (memory.numbers >= since))
 
     def _likeliest_beside(self, condition: Point, goal: Point, missed: Memory) -> Point:
-        """Return the condition around another that most probably hits and was not tried."""
+        """Return the condition around another that most probably hits and was not tried.
+
+        The same again where plans may not be moved as far as what was not tried.
+        """
         at, radius = self._places(condition[None], goal[None]), missed.missed_by[-1]
         there = self.belief.outcomes(0, at)
         sd = np.sqrt(np.diag(self.belief.spread(0, there)[0]))
         tried = self.chart.back(missed.conditions)
         candidates = untried_around(condition, radius + 2.0 * sd, tried, missed.missed_by)
+        w = np.abs(self.belief.prior.moved(self.chart.to(candidates)))
+        farthest = np.where(
+            self.belief.symmetry.learned, np.inf, self._farthest(self._losses(goal))
+        )
+        candidates = candidates[np.all(w <= (1.0 + 1e-6) * farthest, axis=1)]
+        if not len(candidates):
+            return condition
         goals = np.broadcast_to(goal, candidates.shape)
         return np.asarray(candidates[np.argmax(self.p_hit(candidates, goals, radius, seed=0))])
 
