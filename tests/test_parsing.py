@@ -363,7 +363,7 @@ def test_a_stated_unit_is_not_asked_for():
         from_words("80rad long", of("rad"))
 
 
-def test_numbers_as_large_as_those_shown_are_in_the_outcomes_unit():
+def test_numbers_up_to_twice_those_shown_are_in_the_outcomes_unit():
     shown = np.array([[8.5], [-3.0]])
     for place in ("8", np.array([8.0])):
         assert as_place(place, of("rad"), shown) == pytest.approx([8.0])

@@ -14,14 +14,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 from typing_extensions import Self
 
-from prior_reinforce.arrays import Point
-from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.arrays import Point, as_error
+from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError
 from prior_reinforce.units import UNITS, looks_like, spelt
 
 _LEAST_SD = 1 / 3
 """Least sd of a number of unknown origin, in tolerances (ours): half a centimetre of 1.5 cm. Who
 gives numbers for words means to; with twice as much, P(hit) is said too low and adapters lag
 (reproduction/docs/decisions-adapter.md)."""
+_FAR = 10.0
+"""Tolerances from which an error is looked at twice (ours): 15 cm, where 1.5 cm are allowed. It is
+taken for an outcome, or an outcome for an error, where that would be four times nearer."""
 
 
 @dataclass(frozen=True)
@@ -148,3 +151,42 @@ def in_tolerances(error: ArrayLike, tolerance: ArrayLike) -> float:
         tolerance: epsilon, shape (k,), or one number for all.
     """
     return float(np.linalg.norm(np.asarray(error) / np.asarray(tolerance)))
+
+
+def as_bare_error(
+    told: ArrayLike,
+    goal: Point,
+    form: OutcomeFormat,
+    *,
+    landed: bool = False,
+    expected: ArrayLike = 0.0,
+) -> Point:
+    """Return outcome minus goal in the outcome's units, which nobody stated, as a fresh array.
+
+    Args:
+        told: The error; or, if `landed`, the outcome.
+        goal: g, shape (k,).
+        form: What the outcomes are.
+        landed: Whether the outcome was asked for, not the error.
+        expected: How large an error may well be, (k,); such a one is not doubted.
+
+    Raises:
+        InvalidFeedbackError: Wrong shape, not finite, of another unit by its size, or an outcome in
+            place of an error, or the other way round.
+    """
+    array = as_error(told, form.outcome_dim)
+    error, other = (array - goal, array) if landed else (array, array - goal)
+    far, otherwise = (in_tolerances(e, form.tolerance or 1.0) for e in (error, other))
+    doubted = np.abs(error) > expected
+    if form.tolerance and far >= max(_FAR, 4 * otherwise) and doubted.any():
+        kinds = ("an error (outcome minus goal)", "where the object ended")
+        asked, mistaken = kinds[::-1] if landed else kinds
+        said = ", ".join(f"{number:g}" for number in array)
+        raise InvalidFeedbackError(
+            f"{said} looks like {mistaken}; give {asked}, or the unit if it is that "
+            "(in Python a pr.Reading, as pr.Reading.measured)"
+        )
+    if slip := form.slip(np.where(doubted, error, 0.0), error=True):
+        what = "where it ended" if landed else "outcome minus goal"
+        raise InvalidFeedbackError(f"an error in {slip} ({what}), or words with their unit")
+    return error

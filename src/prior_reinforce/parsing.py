@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from prior_reinforce.arrays import Point, as_error, as_goal
 from prior_reinforce.errors import InvalidFeedbackError, InvalidGoalError
-from prior_reinforce.formats import OutcomeFormat, in_tolerances
+from prior_reinforce.formats import OutcomeFormat, as_bare_error
 from prior_reinforce.numerals import (
     BARE_TERM,
     PLUS_MINUS,
@@ -52,9 +52,6 @@ _LEAST_BARE_CM = 0.1
 _OPEN_SDS = 10.0
 """Error assumed where only the direction is known, of what is no length, in its least sds (ours):
 in tolerances as far as 5 cm, where 1.5 cm are allowed."""
-_FAR = 10.0
-"""Tolerances from which an error is looked at twice (ours): 15 cm, where 1.5 cm are allowed. It is
-taken for an outcome, or an outcome for an error, where that would be four times nearer."""
 _SOMEWHERE, _LOST = "somewhere", "lost"
 _ON_THE_GOAL = ("on the goal", "spot on", "0")
 _HITS = {"hit": True, "miss": False, _LOST: False}
@@ -165,9 +162,16 @@ def _refuse_too_large(number: float, unit: str, text: str, *, stated: bool) -> N
 
 
 def as_reading(
-    seen: Reading | ArrayLike | None, hit: bool | None, goal: Point, form: OutcomeFormat
+    seen: Reading | ArrayLike | None,
+    hit: bool | None,
+    goal: Point,
+    form: OutcomeFormat,
+    expected: ArrayLike = 0.0,
 ) -> Reading:
-    """Return what was seen of a trial as a reading; arguments and errors as in `Session.tell`."""
+    """Return what was seen of a trial as a reading; arguments and errors as in `Session.tell`.
+
+    `expected` as for `as_bare_error`.
+    """
     if not (hit is None or isinstance(hit, (bool, np.bool_))):
         raise InvalidFeedbackError(f"hit must be True, False or None, got {hit!r}")
     if seen is None:
@@ -180,7 +184,9 @@ def as_reading(
         as_error(seen.error_seen, form.outcome_dim)
         reading = seen
     else:
-        reading = Reading.estimated(as_bare_error(seen, goal, form), form.least_sd)
+        reading = Reading.estimated(
+            as_bare_error(seen, goal, form, expected=expected), form.least_sd
+        )
     if reading.said and None not in (hit, reading.hit) and reading.hit != hit:
         beside = "hit" if hit else "miss"
         raise InvalidFeedbackError(f'"{reading.said}" contradicts {beside}; say one of them')
@@ -190,44 +196,13 @@ def as_reading(
     return reading
 
 
-def as_bare_error(
-    told: ArrayLike, goal: Point, form: OutcomeFormat, *, landed: bool = False
-) -> Point:
-    """Return outcome minus goal in the outcome's units, which nobody stated, as a fresh array.
-
-    Args:
-        told: The error; or, if `landed`, the outcome.
-        goal: g, shape (k,).
-        form: What the outcomes are.
-        landed: Whether the outcome was asked for, not the error.
-
-    Raises:
-        InvalidFeedbackError: Wrong shape, not finite, of another unit by its size, or an outcome in
-            place of an error, or the other way round.
-    """
-    array = as_error(told, form.outcome_dim)
-    error, other = (array - goal, array) if landed else (array, array - goal)
-    far, otherwise = (in_tolerances(e, form.tolerance or 1.0) for e in (error, other))
-    if form.tolerance and far >= max(_FAR, 4 * otherwise):
-        kinds = ("an error (outcome minus goal)", "where the object ended")
-        asked, mistaken = kinds[::-1] if landed else kinds
-        said = ", ".join(f"{number:g}" for number in array)
-        raise InvalidFeedbackError(
-            f"{said} looks like {mistaken}; give {asked}, or the unit if it is that"
-        )
-    if slip := form.slip(error, error=True):
-        what = "where it ended" if landed else "outcome minus goal"
-        raise InvalidFeedbackError(f"an error in {slip} ({what}), or words with their unit")
-    return error
-
-
 def as_place(place: ArrayLike | str, form: OutcomeFormat, shown: ArrayLike = 0.0) -> Point:
     """Return a goal as numbers in the outcome's units: it is given as such, or said (`read_place`).
 
     Args:
         place: The goal, shape (k,), or in words.
         form: What the outcomes are.
-        shown: Outcomes that are known, (N, k); smaller numbers are in the outcomes' units.
+        shown: Outcomes that are known, (N, k); numbers up to twice as large are in their units.
 
     Raises:
         InvalidGoalError: It cannot be read, has another shape, is not finite, or of another unit by
@@ -306,8 +281,8 @@ def read_place(text: str, form: OutcomeFormat, shown: ArrayLike = 0.0) -> Point:
 
 
 def _beyond(numbers: ArrayLike, shown: ArrayLike) -> Point:
-    """The numbers that are larger than all that was shown; 0 in place of the others."""
-    return np.where(np.abs(numbers) > np.max(np.abs(shown), axis=0), numbers, 0.0)
+    """The numbers that are more than twice what was shown; 0 in place of the others."""
+    return np.where(np.abs(numbers) > 2.0 * np.max(np.abs(shown), axis=0), numbers, 0.0)
 
 
 def _numbers_with_units(text: str, units: Sequence[str]) -> list[float] | None:

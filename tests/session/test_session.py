@@ -22,10 +22,12 @@ from prior_reinforce.errors import (
     WorkspaceError,
 )
 from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.generators import make_generator
 from prior_reinforce.generators.base import Generator
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.plans.symmetry import TurnJoint, turn_and_scale
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.session import Session, ask_all
 from prior_reinforce.session.trials import Log, Stage, State
@@ -806,6 +808,22 @@ def test_printed_it_is_short(session):
 
 def test_a_void_needs_no_reason(session):
     assert session.void(session.ask().number).note == ""
+
+
+def test_an_error_as_large_as_is_expected_is_no_slip():
+    """The first throw at a goal twice as far as the demonstration may fall short by metres."""
+    turn = turn_and_scale(TurnJoint())
+    one = Demonstrations(DEMOS.plans[:1], [[2.0, 0.1]], DEMOS.format, symmetry=turn)
+    session = Session(make_generator("auto").fit(one, seed=0), BayesianAdapter(), one)
+    session.set_goal(
+        [3.9, 0.2], 0.015
+    )  # within twice what was shown, whatever a slip of units would be
+    error = 1.5 * np.array(session.ask().expected.sd) * [-1.0, 0.0]
+    assert error[0] < -1.0  # metres, which from nowhere look like centimetres
+    assert session.tell(1, error).reading.error_seen == pytest.approx(error)
+    session.ask()
+    with pytest.raises(InvalidFeedbackError, match="looks like centimetres"):
+        session.tell(2, [-3.9, 0.2])
 
 
 @pytest.mark.parametrize("outcome", [[0.9, 0.1], [0.91, 0.12], [0.8, 0.0], [1.10, 0.12]])

@@ -49,6 +49,13 @@ class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
     beyond: bool = False
     """Whether no plan may be moved so far that it reaches the goal."""
 
+    @property
+    def large_error(self) -> Point:
+        """How large an error may well be, (k,): two standard deviations; 0 if nothing is known."""
+        if self.error is None or self.sd is None:
+            return np.zeros(1)
+        return np.asarray(np.abs(self.error) + 2.0 * np.array(self.sd))
+
     def __post_init__(self) -> None:
         """Keep plain numbers of whatever arrays were given, since journals write them down."""
         for name in ("p_hit", "trials", "error", "sd"):

@@ -22,8 +22,9 @@ from prior_reinforce.arrays import Point
 from prior_reinforce.commands import warn
 from prior_reinforce.commands.base import OnWorkspace, Words, trial_and_rest
 from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError
+from prior_reinforce.formats import as_bare_error
 from prior_reinforce.numerals import read_numbers, with_points
-from prior_reinforce.parsing import as_bare_error, from_words, read_uncertain_place
+from prior_reinforce.parsing import from_words, read_uncertain_place
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.trials import Goal, Trial
 from prior_reinforce.wording import bare_units, error_example

@@ -344,7 +344,7 @@ class Session:
         seen: Reading | ArrayLike | None,
         hit: bool | None,
     ) -> None:
-        reading = as_reading(seen, hit, goal.goal, goal.format)
+        reading = as_reading(seen, hit, goal.goal, goal.format, trial.expected.large_error)
         # Where a component is open, nobody knows.
         near = goal.is_hit(reading.error_seen) and np.isfinite(reading.spread).all()
         reached = near if reading.hit is None else reading.hit
