@@ -522,3 +522,17 @@ def test_where_the_tolerance_is_far_finer_than_the_eye_nothing_is_repeated():
     apart = np.linalg.norm(np.array(tried)[:, None] - np.array(tried), axis=2)
     assert np.all(apart[np.triu_indices(5, 1)] > 0.001)
     assert adapter.expect(tried[0], goal, 0.002).p_hit < 0.05
+
+
+def test_where_nothing_reaches_the_goal_no_throw_is_made_twice_for_it():
+    """Beyond 2 m the throw falls back, so that no condition lands on 2.15 m; each miss was read."""
+    shown = np.array([[1.0, -0.3], [1.0, 0.3], [2.0, -0.3], [2.0, 0.3], [1.5, 0.0], [1.6, 0.15]])
+    adapter, goal, thrown = started(shown), np.array([2.15, 0.1]), []
+    for _ in range(8):
+        x, y = adapter.propose(goal)
+        thrown.append((x, y))
+        error = np.array([x if x < 2.0 else 2.0 - 1.2 * (x - 2.0), y]) - goal
+        reading = Reading.estimated(error, 0.01, hit=False)
+        adapter.observe(np.array([x, y]), goal, reading.within(np.full(2, 0.03)))
+    apart = np.linalg.norm(np.array(thrown)[:, None] - thrown, axis=2)
+    assert apart[np.triu_indices(8, 1)].min() > 0.01

@@ -166,11 +166,10 @@ class DisplacedTrials:
         """Return the condition to try next; see `Adapter.propose`."""
         goal = self._normalisation.apply(goal_seen)
         condition = self._most_probable(goal)
-        missed = self._memory.bare_misses(self._memory.aims)
-        same = self._as_now(missed, goal) & np.all(missed.goals == goal, axis=1)
-        tried = missed.only(same)
+        told = self._memory.only(self._memory.missed)
+        tried = told.only(self._as_now(told, goal) & np.all(told.goals == goal, axis=1))
         if tried_again(condition[None], tried.conditions, tried.missed_by)[0]:
-            condition = self._likeliest_beside(condition, goal, missed, missed.only(same))
+            condition = self._likeliest_beside(condition, goal, tried)
         return self._normalisation.undo(condition)
 
     def _most_probable(self, goal: Point) -> Point:
@@ -181,13 +180,9 @@ class DisplacedTrials:
         """
         learned = self._expected_to_land_on(goal, self._histories[0])
         conditions = np.array([learned, goal - self._prior.mean(goal[None])[:, 0]])
-        missed, places = self._memory.bare_misses(self._memory.aims), self._places(conditions, goal)
         told = self._memory.missed_by[self._memory.missed]
         radius = told[-1] if len(told) else np.full(len(goal), _NOMINAL)
-        if len(missed.numbers) > 0:
-            p_hit = self._p_hit_after(missed, places, radius)
-        else:
-            p_hit = self._p_hit(places, goal - conditions, radius)
+        p_hit = self._p_hit_now(self._places(conditions, goal), radius)
         return np.asarray(conditions[0 if p_hit[0] > _HARDLY else np.argmax(p_hit)])
 
     def _expected_to_land_on(self, goal: Point, history: History) -> Point:
@@ -208,9 +203,7 @@ class DisplacedTrials:
         same = [change.concerns(trials) for change in changes if change.concerns(now)[0]]
         return np.all(same, axis=0) if same else np.ones(len(trials.numbers), dtype=bool)
 
-    def _likeliest_beside(
-        self, condition: Point, goal: Point, missed: Memory, same: Memory
-    ) -> Point:
+    def _likeliest_beside(self, condition: Point, goal: Point, tried: Memory) -> Point:
         """Return the condition around another that most probably hits, within the last tolerance.
 
         No farther away than changed hardware takes it: where weights are steep, the sd means
@@ -221,10 +214,10 @@ class DisplacedTrials:
         _, variance = best.predict(self._prior, at, self._memory)
         share = best.posterior.model_weights
         sd = math.sqrt(float(np.einsum("mk,mkp->k", share, variance).max()))
-        radius = missed.missed_by[-1]
+        radius = tried.missed_by[-1]
         reach = radius + 2.0 * min(sd, self.config.hardware_sd[1])
-        candidates = untried_around(condition, reach, same.conditions, same.missed_by)
-        p_hit = self._p_hit_after(missed, self._places(candidates, goal), radius)
+        candidates = untried_around(condition, reach, tried.conditions, tried.missed_by)
+        p_hit = self._p_hit_now(self._places(candidates, goal), radius)
         return np.asarray(candidates[np.argmax(p_hit)])
 
     def expect(self, condition: Point, goal: Point, tolerance: Point) -> Expectation:
@@ -240,11 +233,7 @@ class DisplacedTrials:
         """Return each condition's probability of a hit; see `BayesianAdapter.p_hit`."""
         radius = np.asarray(tolerance) / self._normalisation.scale
         at, targets = (self._normalisation.apply(values) for values in (conditions, goals))
-        places = self._places(at, targets)
-        missed = self._memory.bare_misses(self._memory.aims)
-        if len(missed.numbers) > 0:
-            return self._p_hit_after(missed, places, radius, seed=1)
-        return self._p_hit(places, places.goals - places.conditions, radius)
+        return self._p_hit_now(self._places(at, targets), radius, seed=1)
 
     def _places(
         self, conditions: Points, goal: Point | Points, number: int | None = None
@@ -264,6 +253,13 @@ class DisplacedTrials:
         for probability, history in self._weighed():
             share = history.posterior.model_weights
             yield probability, share, *history.predict(self._prior, at, self._memory)
+
+    def _p_hit_now(self, at: Places, radius: Point, *, seed: int = 0) -> Float[np.ndarray, " n"]:
+        """Probability that each condition hits its goal, given all that was told."""
+        missed = self._memory.bare_misses(self._memory.aims)
+        if len(missed.numbers) > 0:
+            return self._p_hit_after(missed, at, radius, seed=seed)
+        return self._p_hit(at, at.goals - at.conditions, radius)
 
     def _p_hit(self, at: Places, aims: Points, radius: Point) -> Float[np.ndarray, " n"]:
         """Probability that the displacement at each condition hits its aim."""
