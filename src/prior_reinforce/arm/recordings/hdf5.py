@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import may_move
 from prior_reinforce.arm.recordings.bounds import MOST_COLUMNS, check_numbers
 from prior_reinforce.arm.recordings.naming import said_in
 from prior_reinforce.arm.recordings.options import ReadOptions
@@ -33,6 +32,7 @@ from prior_reinforce.arm.recordings.stated import (
     motion_keys,
     other_count,
     recorded_among,
+    worth_reading,
 )
 from prior_reinforce.arm.recordings.time_finder import Stamps
 from prior_reinforce.errors import FileFormatError
@@ -42,8 +42,6 @@ _KEYS = ("obs/robot0_joint_pos", "obs/agent/qpos", "observations/qpos")
 """Measured positions of the first arm; `actions` are mostly pose increments or targets."""
 _MOST_BESIDE, _MOST_BYTES_OF_NAMES = 64, 100_000
 """Members of a group that is looked through for names, and bytes of these."""
-_MOST_AT_OWN_RATE = 1_000_000
-"""Numbers of what moves at another rate than the motion. Ours: sound has more."""
 _PACKING = ("scale_factor", "add_offset")
 """Attributes by which netCDF packs numbers: a value is number * scale_factor + add_offset."""
 _FILL = ("_FillValue", "missing_value")
@@ -87,20 +85,9 @@ def _demo(path: Path, top: Any, within: str, options: ReadOptions, episode: str)
         group = _own(path, top, within)
         found = by_field(_arrays_in(path, group, options.key or _KEYS), _Field)
         keys = motion_keys(f"{path}: {group.name}", options, found, _KEYS)
-        numbers = {name: own for name, own in found.items() if own.dtype.kind in "biuf"}
-        shapes = {name: own.shape for name, own in numbers.items() if own.shape}
-        key, count = keys[0], shapes[keys[0]][0]
-        # Whatever may move, at any rate, or tells the time of the frames, or marks what is padding.
-        there = {
-            name: _numbers(path, name, found[name])
-            for name, own in shapes.items()
-            if name in keys
-            or (
-                len(own) <= 2
-                and (own[0] == count or math.prod(own) <= _MOST_AT_OWN_RATE)
-                and (math.prod(own) == count or may_move(name, math.prod(own[1:])))
-            )
-        }
+        key, count = keys[0], found[keys[0]].shape[0]
+        shapes = {name: own.shape for name, own in found.items() if own.dtype.kind in "biuf"}
+        there = {name: _numbers(path, name, found[name]) for name in worth_reading(shapes, keys)}
         of_key = found[key]
         texts, stated = _said(top, group, of_key.record if isinstance(of_key, _Field) else of_key)
         # By robomimic the frames of this very demonstration; elsewhere it may be a total.

@@ -10,9 +10,9 @@ of a recorder (0.4.4) that ended without `finalize()` has no footer, and cannot 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from prior_reinforce.arm.recordings.beside import may_move
 from prior_reinforce.arm.recordings.bounds import check_bytes, check_numbers
 from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.clock import NO_COLUMN, Clock, clock_among, hold_together
-from prior_reinforce.arm.recordings.naming import missing_channels
+from prior_reinforce.arm.recordings.naming import missing_channels, said_in
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import Episodes, Positions, Recording, named_damage
 from prior_reinforce.arm.recordings.stated import recorded_among
@@ -250,26 +250,8 @@ def _rows(column: Any) -> Positions:
 
 def _names(feature: Any) -> tuple[str, ...]:
     """Channel names in every form that writers give them; none where there are none."""
-    found = list(_flat(feature.get("names") if isinstance(feature, dict) else None))
-    names = tuple(name for _, name in found)
+    groups = said_in({"": feature.get("names") if isinstance(feature, dict) else None})[0]
+    names = tuple(chain(*groups.values()))
     if len(set(names)) < len(names):  # two arms whose joints have one name each
-        names = tuple(f"{group}{name}" for group, name in found)
+        names = tuple(f"{group}.{name}" for group, own in groups.items() for name in own)
     return names
-
-
-def _flat(said: Any, group: str = "") -> Iterator[tuple[str, str]]:
-    """Names, with their groups, of a list, `{name: index}`, `{index: name}`, or groups of these."""
-    if isinstance(said, dict):
-        numbers = sorted(map(str, range(len(said))))
-        if sorted(map(str, said)) == numbers:
-            said = [said[key] for key in sorted(said, key=int)]
-        elif sorted(map(str, said.values())) == numbers:
-            said = sorted(said, key=lambda name: int(said[name]))
-    if isinstance(said, str):
-        yield group, said
-    elif isinstance(said, list):
-        for part in said:
-            yield from _flat(part, group)
-    elif isinstance(said, dict):
-        for key, part in said.items():
-            yield from _flat(part, f"{group}{key}.")

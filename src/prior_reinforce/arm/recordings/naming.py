@@ -6,6 +6,7 @@ import contextlib
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -124,8 +125,12 @@ def _search(place: str, said: Any, depth: int = _DEEPEST) -> Iterator[tuple[str,
         keys = [key for key in said[0] if all(key in one for one in said)]
         said = {key: [one[key] for one in said] for key in keys}  # [{"name": "elbow"}, ...]
     if isinstance(said, Mapping):
-        if len(said) > 1 and _numbers_its_names(said):  # {"elbow": 0, "pan": 1}
-            yield place, sorted(map(str, said), key=lambda name: said[name])
+        names = _numbered(said)
+        if all(isinstance(one, str) for one in said.values()):
+            names = names or _numbered({one: key for key, one in said.items()})
+        if names:
+            yield place, names
+            return
         for key, one in said.items() if depth else ():
             yield from _search(f"{place}.{key}" if place else str(key), one, depth - 1)
     elif isinstance(said, str) and said.lstrip()[:1] == "{":
@@ -133,13 +138,15 @@ def _search(place: str, said: Any, depth: int = _DEEPEST) -> Iterator[tuple[str,
     elif isinstance(said, (int, float, str)) and not isinstance(said, bool):
         yield place, said
     elif isinstance(said, (list, tuple)):
-        yield place, list(said)
+        groups = said and all(isinstance(one, list) for one in said)
+        yield place, [*chain(*said)] if groups else [*said]
 
 
-def _numbers_its_names(said: Mapping[Any, Any]) -> bool:
-    """Whether every key has its own number from 0, as the place of a column."""
-    numbers = [n for n in said.values() if isinstance(n, int) and not isinstance(n, bool)]
-    return len(numbers) == len(said) and sorted(numbers) == list(range(len(said)))
+def _numbered(said: Mapping[Any, Any]) -> list[str]:
+    """Names that have their own number from 0 each, as `{"elbow": 0, "pan": 1}`; none of others."""
+    at = {str(number): str(name) for name, number in said.items()}
+    numbers = list(map(str, range(len(said))))
+    return [at[number] for number in numbers] if sorted(at) == sorted(numbers) else []
 
 
 def _find(name: str, there: Sequence[str], wanted: Sequence[str]) -> int | None:

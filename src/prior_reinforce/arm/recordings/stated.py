@@ -6,6 +6,7 @@ many as the columns.
 
 from __future__ import annotations
 
+import math
 import re
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import MASK, Arrays, arrays_beside
+from prior_reinforce.arm.recordings.beside import MASK, Arrays, arrays_beside, may_move
 from prior_reinforce.arm.recordings.bounds import check_names
 from prior_reinforce.arm.recordings.channels import Kind, kinds, one_for_all
 from prior_reinforce.arm.recordings.clock import Clock, clock_among
@@ -51,6 +52,9 @@ _OUTCOME = re.compile(r"(.*[^a-z])?(outcomes?|landings?|landed)([^a-z].*)?", re.
 """What an array of where objects landed is called."""
 _UNIT = re.compile(r"((joint|angle|angular|position|motion|rotation)s?_?)?units?", re.IGNORECASE)
 """What the joints' units are called among others, deep in what a file says of itself."""
+_SOUND, _FASTER = 1_000_000, 20
+"""Numbers of what moves at another rate than the motion, at most, and how many times the motion's,
+if that is more. Ours: sound has more."""
 _MOST_SAID = 1_000_000
 """Bytes of a JSON beside a table at most. Ours: it says what the columns are."""
 
@@ -97,6 +101,16 @@ def motion_keys(
                 f"{' or (N, T, D)' * (most > 2)}); it holds {there or fit}: say which with --key"
             )
     return keys
+
+
+def worth_reading(shapes: Mapping[str, Sequence[int]], keys: Sequence[str]) -> Iterator[str]:
+    """Which arrays are the motion, may move beside it, tell its times, or mark what is padding."""
+    count, most = shapes[keys[0]][0], max(_SOUND, _FASTER * math.prod(shapes[keys[0]]))
+    for name, shape in shapes.items():
+        size = math.prod(shape)
+        fits = 0 < len(shape) <= 2 and (shape[0] == count or size <= most)
+        if name in keys or (fits and (size == count or may_move(name, math.prod(shape[1:])))):
+            yield name
 
 
 def recorded_among(

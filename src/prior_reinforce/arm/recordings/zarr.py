@@ -8,7 +8,6 @@ writer adds `data/timestamp`, as UMI's does.
 from __future__ import annotations
 
 import json
-import math
 import re
 import zipfile
 from collections.abc import Iterator, Mapping
@@ -18,12 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import may_move
 from prior_reinforce.arm.recordings.bounds import check_bytes, check_chunks, check_numbers
 from prior_reinforce.arm.recordings.naming import said_in
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import Episodes, Recording, named_damage
-from prior_reinforce.arm.recordings.stated import motion_keys, recorded_among
+from prior_reinforce.arm.recordings.stated import motion_keys, recorded_among, worth_reading
 from prior_reinforce.arm.recordings.time_finder import Stamps
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import require_inside
@@ -31,8 +29,6 @@ from prior_reinforce.files import require_inside
 Arrays = Mapping[str, tuple[tuple[int, ...], tuple[int, ...]]]
 """Shape and chunks of each array of numbers, by its name in the store."""
 _ENDS = "meta/episode_ends"
-_MOST_FASTER = 20
-"""Times as many numbers as the motion has, of what moves at a rate of its own. Ours."""
 _NUMBERS = re.compile(r"([<>|][biuf]\d+)|(bool|u?int\d+|float\d+)")
 _CODECS = frozenset(
     {"blosc", "bytes", "bz2", "crc32c", "delta", "gzip", "lz4", "lzma"}
@@ -67,15 +63,8 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         if _ENDS not in arrays:
             raise FileFormatError(f"{source} has no numbers at {_ENDS}; copy the store again")
         ends = np.asarray(_numbers(source, group, arrays, _ENDS), dtype=np.int64).ravel()
-        count = shapes[keys[0]][0]
-        most = _MOST_FASTER * math.prod(shapes[keys[0]])  # sound has more
-        numbers = {
-            name: _numbers(source, group, arrays, f"data/{name}")
-            for name, (frames, *width) in shapes.items()
-            if name in keys
-            or (frames == count and math.prod(width) == 1)
-            or (len(width) < 2 and frames * math.prod(width) <= most and may_move(name, *width))
-        }
+        count, needed = shapes[keys[0]][0], worth_reading(shapes, keys)
+        numbers = {name: _numbers(source, group, arrays, f"data/{name}") for name in needed}
         nodes = (group[f"data/{keys[0]}"], group["data"], group)
         texts, stated = said_in({n: said for node in nodes[::-1] for n, said in node.attrs.items()})
         stated = {f".{name}": number for name, number in stated.items()}  # of all episodes: a rate
