@@ -241,34 +241,38 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
             f"{example}{why}"
         )
     units = [table.units[i] or split[i][1] for i in columns]
-    _doubt_thousands(path, table, dict(zip(columns, units, strict=True)))
+    _doubt_thousands(table, dict(zip(columns, units, strict=True)))
     scale = [base_of(unit)[1] if unit else 1.0 for unit in units]
     sd, source = (lower.index(name) if name in lower else None for name in (SD, SOURCE))
-    cells = table.cells
-    rows, sources = list[str](), list[str]()
-    places, sds = list[list[float]](), list[float]()
-    for row, cell in enumerate(cells[key]):
-        file = _FILE.fullmatch(from_cell(cell))
-        name = file[1] if file else from_cell(cell)
-        if name in rows:
+    table = table.rows([r for r in range(len(table)) if any(table.cells[i][r] for i in columns)])
+    files = [(_FILE.fullmatch(from_cell(cell)), from_cell(cell)) for cell in table.cells[key]]
+    rows = [file[1] if file else cell for file, cell in files]
+    for row, name in enumerate(rows):
+        if name in rows[:row]:
             line = table.lines[row]
             raise FileFormatError(f"{path}, line {line}: episode {name} again; drop one of them")
-        if not any(cells[i][row] for i in columns):
-            continue
-        rows.append(name)
-        sources += [] if source is None else [cells[source][row]]
-        places += ([_finite(path, table, row, i) * s for i, s in zip(columns, scale, strict=True)],)
-        sds.append(0.0 if sd is None or not cells[sd][row] else _finite(path, table, row, sd))
+    values = np.zeros((len(rows), len(columns)))
+    sds = np.zeros(len(rows))
+    for row in range(len(rows)):
+        values[row] = [_finite(table, row, i) for i in columns]
+        if sd is not None and table.cells[sd][row]:
+            sds[row] = _finite(table, row, sd)
     sd_unit = None if sd is None else table.units[sd] or split[sd][1]
-    sds = sds if sd_unit else [scale[0] * each for each in sds]
-    bare = tuple(base_of(unit)[0] if unit else None for unit in units)
-    values = np.array(places).reshape(len(rows), len(kept))
-    found = Outcomes(str(path), (*rows,), values, np.array(sds), (*kept,), bare, sd_unit)
-    word = lower[key].split("_")[0]
-    return replace(found, sources=tuple(sources), word=word, scale=tuple(scale))
+    return Outcomes(
+        str(path),
+        tuple(rows),
+        values * scale,
+        sds if sd_unit else scale[0] * sds,
+        tuple(kept),
+        tuple(base_of(unit)[0] if unit else None for unit in units),
+        sd_unit,
+        sources=() if source is None else tuple(table.cells[source]),
+        word=lower[key].split("_")[0],
+        scale=tuple(scale),
+    )
 
 
-def _doubt_thousands(path: Path, table: Table, columns: Mapping[int, str | None]) -> None:
+def _doubt_thousands(table: Table, columns: Mapping[int, str | None]) -> None:
     """Refuse `1.488` beside `-302`: is that one and a half, or one and a half thousand?
 
     FileFormatError if every number with a decimal sign may be a whole one of four digits or more,
@@ -285,13 +289,15 @@ def _doubt_thousands(path: Path, table: Table, columns: Mapping[int, str | None]
             beside += [_SEMICOLONS] * is_possible(base, 1000 * most)
     if signed and beside and all(_THOUSANDS.fullmatch(cell) for cell, _, _ in signed):
         cell, row, column = signed[0]
-        raise FileFormatError(
-            f"{path}, line {table.lines[row]}: {table.names[column]} is {cell!r} beside "
-            f"{beside[0]}; if that is a thousand, write it without a sign, else write {cell}0"
+        raise table.unlike(
+            row,
+            column,
+            f" beside {beside[0]}; if that is a thousand, write it without a sign, else write "
+            f"{cell}0",
         )
 
 
-def _finite(path: Path, table: Table, row: int, column: int) -> float:
+def _finite(table: Table, row: int, column: int) -> float:
     value = float(table.values[row, column])
     if not math.isfinite(value):
         name, cell = table.names[column], table.cells[column][row][:40]
@@ -302,20 +308,15 @@ def _finite(path: Path, table: Table, row: int, column: int) -> float:
                 remedy += ", with the sign that the letter says: left is positive, right negative"
         if (said := _WITH_UNIT.fullmatch(cell)) and (unit := known_unit(said[2])):
             remedy = f"write {said[1]}, and the unit in the head: {name} [{unit}]"
-        raise FileFormatError(
-            f"{path}, line {table.lines[row]}: {name} is {cell!r}, expected a finite number; "
-            f"{remedy}"
-        )
+        raise table.unlike(row, column, f", expected a finite number; {remedy}")
     return value
 
 
 def places_of(episodes: Sequence[str], outcomes: Outcomes) -> dict[str, Place]:
     """Return where each episode's object landed, if that is known, by the rule of `outcomes_of`."""
-    picked = _matched(episodes, outcomes)
-    rows = {episode: outcomes.episodes.index(name) for episode, name in picked.items()}
     return {
         episode: (*outcomes.values[row].tolist(), float(outcomes.sd[row]))
-        for episode, row in rows.items()
+        for episode, row in _rows(episodes, outcomes).items()
         if np.all(np.isfinite(outcomes.values[row]))
     }
 
@@ -344,8 +345,8 @@ def _differs(path: Path, outcomes: Outcomes) -> bool:
 
 def missing_outcomes(episodes: Sequence[str], outcomes: Outcomes) -> list[str]:
     """Return the episodes that a table lacks, by the rule of `outcomes_of`."""
-    picked = _matched(episodes, outcomes)
-    return [episode for episode in episodes if episode not in picked]
+    there = _rows(episodes, outcomes)
+    return [episode for episode in episodes if episode not in there]
 
 
 def check_rows(
@@ -363,8 +364,8 @@ def check_rows(
     rows = outcomes.episodes
     word = telling_word(outcomes.word, chosen, there, rows)
     outcomes = replace(outcomes, word=word)
-    picked = _matched(chosen, outcomes).values()
-    known = {*there, *picked} | {number_of(name, word) for name in there} - {""}
+    picked = {rows[row] for row in _rows(chosen, outcomes).values()}
+    known = {*there} | picked | {number_of(name, word) for name in there} - {""}
     unknown = [name for name in rows if name not in known and digits_at_end(name) not in known]
     if unknown and {*outcomes.names} & {*there}:
         raise InvalidDemonstrationsError(
@@ -416,8 +417,7 @@ def outcomes_of(
         InvalidDemonstrationsError: Outcomes that are missing or not finite; each is named.
     """
     there = outcomes.episodes
-    picked, missing = _matched(episodes, outcomes), missing_outcomes(episodes, outcomes)
-    if missing:
+    if missing := missing_outcomes(episodes, outcomes):
         back = advice(missing)
         renumber = how_to_renumber(outcomes.word, episodes, there)
         raise InvalidDemonstrationsError(
@@ -425,7 +425,7 @@ def outcomes_of(
             f"{listed(there) or 'none'}); {renumber}measure and add them, or "
             f"leave those episodes out, --leave-out {shlex.join(missing)}{'; ' * bool(back)}{back}"
         )
-    rows = [there.index(picked[episode]) for episode in episodes]
+    rows = list(_rows(episodes, outcomes).values())
     values = outcomes.values[rows]
     for episode, row in zip(episodes, values, strict=True):
         if not np.all(np.isfinite(row)):
@@ -436,15 +436,13 @@ def outcomes_of(
     return values, np.tile(outcomes.sd[rows, None], values.shape[1])
 
 
-def _matched(episodes: Sequence[str], outcomes: Outcomes) -> dict[str, str]:
-    """Name in the table by episode; a number of two names matches none."""
-    names = outcomes.episodes
+def _rows(episodes: Sequence[str], outcomes: Outcomes) -> dict[str, int]:
+    """Row by episode, in their order; a number of two names matches none."""
     numbers = [number_of(episode, outcomes.word) for episode in episodes]
-    there = list(map(digits_at_end, names))
-    picked: dict[str, str] = {}
+    there, rows = list(map(digits_at_end, outcomes.episodes)), dict[str, int]()
     for episode, number in zip(episodes, numbers, strict=True):
-        if episode in names:
-            picked[episode] = episode
+        if episode in outcomes.episodes:
+            rows[episode] = outcomes.episodes.index(episode)
         elif number and numbers.count(number) == 1 and there.count(number) == 1:
-            picked[episode] = names[there.index(number)]
-    return picked
+            rows[episode] = there.index(number)
+    return rows

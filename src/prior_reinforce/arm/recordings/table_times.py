@@ -33,7 +33,7 @@ from prior_reinforce.arm.recordings.time_finder import (
     says_time,
 )
 from prior_reinforce.arm.recordings.units import SECONDS, known_unit, say_names, split_unit
-from prior_reinforce.errors import ConfigurationError, FileFormatError
+from prior_reinforce.errors import ConfigurationError
 
 _TIMES = (
     "t", "time", "times", "timestamp", "timestamps", "stamp", "elapsed", "elapsed_time", "duration",
@@ -212,7 +212,4 @@ def _check_times(table: Table, columns: Sequence[int]) -> None:
             remedy = "take that line out"
             if _THOUSAND.fullmatch(table.cells[i][row]):
                 remedy = "if that is a thousand, write the column without such marks"
-            raise FileFormatError(
-                f"{table.where}, line {table.lines[row]}: {table.names[i]} is "
-                f"{table.cells[i][row][:40]!r}, expected a time; {remedy}"
-            )
+            raise table.unlike(row, i, f", expected a time; {remedy}")

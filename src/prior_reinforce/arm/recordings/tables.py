@@ -104,20 +104,22 @@ class Table:
         columns = [[_number(cell, self.decimal) for cell in column] for column in self.cells]
         return np.array(columns, dtype=float).reshape(len(self.names), len(self)).T
 
+    def unlike(self, row: int, column: int, says: str) -> FileFormatError:
+        """Return what to raise of a cell: its line and text, and what that `says`."""
+        where, cell = f"{self.where}, line {self.lines[row]}", self.cells[column][row][:40]
+        return FileFormatError(f"{where}: {self.names[column]} is {cell!r}{says}")
+
     def numbers(self, column: int) -> Column:
         """Return a column as numbers; FileFormatError names the line of a cell that is none."""
         none = np.flatnonzero(np.isnan(self.values[:, column])).tolist()
         bad = [self.cells[column][i] for i in none]
         for i in none:
-            text = self.cells[column][i]
-            if text.lower() not in _NAN:
+            if self.cells[column][i].lower() not in _NAN:
                 remedy = "mend that cell"
                 if sum(re.search(r"\d", cell) is not None for cell in bad) > 1:
                     remedy = f"so are {len(bad)} of {len(self)} rows: {PLAIN}"
-                raise FileFormatError(
-                    f"{self.where}, line {self.lines[i]}: {self.names[column]} is {text[:40]!r}, "
-                    f"expected a number; {remedy}, or keep other columns"
-                )
+                says = f", expected a number; {remedy}, or keep other columns"
+                raise self.unlike(i, column, says)
         return self.values[:, column]
 
     def columns(self, chosen: Sequence[int]) -> Float[np.ndarray, "T D"]:
