@@ -33,8 +33,7 @@ def check_scale(before: Demonstrations, selection: Selection) -> None:
     """Check that recordings have the columns and units of the demonstrations in use.
 
     Raises:
-        InvalidDemonstrationsError: They have not, or a channel's numbers are so many times those in
-            use that they are in another unit.
+        InvalidDemonstrationsError: They have not, or a channel's numbers look like another unit.
     """
     form = before.format
     _check_alike(

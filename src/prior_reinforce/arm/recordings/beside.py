@@ -1,7 +1,6 @@
 """What moves in a file beside the motion: a gripper, a rail, a second arm.
 
-Recorders call these things as they like. So they are told by what they hold: a command repeats the
-motion; a clock runs with it.
+Recorders call it as they like, so it is told by what it holds: a command repeats the motion.
 """
 
 from __future__ import annotations
@@ -45,8 +44,7 @@ fifth of the recording either way. Ours: a command differs by what a controller 
 _SCALES = (1.0, TURN["deg"] / TURN["rad"], TURN["rad"] / TURN["deg"], 1000.0, 100.0, 0.01, 0.001)
 """Factors between readings in two units."""
 _OTHER_ZERO = 1.0
-"""Part of its spread by which a command lies beside the motion at most, as under a load. Ours; what
-starts from another pose is another arm."""
+"""Part of its spread by which a command lies beside the motion at most, as under a load. Ours."""
 _SIDE = re.compile(
     r"(?<!b)right|left|izq|der(?=ech)|gauche|droite?|(robot|arm|hand|gripper)_?\d+"
     r"|(?<![a-z])[lr](?![a-z])"

@@ -1,8 +1,7 @@
 """How large recordings may be: checked from headers and counts, before anything is allocated.
 
-A throw is a few seconds of about ten channels. A small file can claim, or unpack to, more than any
-machine holds; the limits of all readers stand here, each far above what arms record. Every check
-raises FileFormatError.
+A small file can claim, or unpack to, more than any machine holds; the limits of all readers stand
+here, each far above what arms record. Every check raises FileFormatError.
 """
 
 from __future__ import annotations
@@ -14,8 +13,7 @@ from pathlib import Path
 from prior_reinforce.errors import FileFormatError
 
 MOST_NUMBERS = 10_000_000
-"""Numbers of one array, and of all episodes together: 14 channels at 1 kHz for 12 minutes. A few
-copies of them are made."""
+"""Numbers of one array, and of all episodes together: 14 channels at 1 kHz for 12 minutes."""
 MOST_ROWS = 600_000
 """Lines of a table: 10 minutes at 1 kHz."""
 MOST_BYTES = 8 * MOST_NUMBERS

@@ -48,8 +48,7 @@ _WITHIN = (
     r"|base|basis|waist|torso|shoulder|schulter|elbow|ellbogen|arm|wrist|hand|hip|knee|ankle|neck"
     r"|head|pan|tilt"
 )
-"""Words of angles: those that outweigh a gripper's, those that stand alone, and those that are told
-within longer words too (`Handgelenk`)."""
+"""Words of angles: that outweigh a gripper's, that stand alone, or within others (`Handgelenk`)."""
 _TOOL = (
     r"grip|jaw|finger|width|claw|opening|suction|robotiq|wsg|greifer|pince|夹爪|夹具|vacuum|valve"
     r"|pressure|force|torque|voltage|temperature"

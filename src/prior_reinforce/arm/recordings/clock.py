@@ -71,8 +71,7 @@ def declared_rate(
     """Return the rate that a file declares, if any, as `clock_of` takes it.
 
     `said` are its numbers by name, for instance `fps` 50 or `dt_ms` 20, or by their place deep in
-    it, `meta.fps`; these count less. FileFormatError if two contradict each other, and no rate is
-    given.
+    it, `meta.fps`; these count less. FileFormatError if two differ, and no rate is given.
     """
     found: dict[str, float] = {}
     for name, value in sorted(said.items(), key=lambda item: "." in item[0]):
@@ -142,8 +141,7 @@ def clock_of(
     Raises:
         ConfigurationError: An option contradicts the file, or has no use.
         InvalidDemonstrationsError: Stamps that are not numbers, or of another length.
-        FileFormatError: Neither times nor a rate, an implausible declared rate, or one that the
-            stamps contradict.
+        FileFormatError: Neither times nor a rate, or a declared rate that cannot be.
     """
     if own_rate is not None and not _LOWEST_RATE < own_rate < _HIGHEST_RATE:
         raise FileFormatError(

@@ -394,8 +394,7 @@ def with_heads(table: Table) -> Table:
 def _of_levels(table: Table) -> Table:
     """Join further lines of names, as pandas writes of columns of several levels: `elbow/position`.
 
-    Such lines hold no number, date or `nan`, and the line after them does hold a number. The last
-    may say units.
+    Such lines hold no number, date or `nan`, and the next one does. The last may say units.
     """
     are_numbers = ~np.isnan(table.values)
     rows = int(np.argmax(are_numbers.any(axis=1))) if table.named and are_numbers.size else 0

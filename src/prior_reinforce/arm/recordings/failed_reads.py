@@ -18,8 +18,7 @@ _THERE_AND_BACK = 0.14
 _WAITS = 3.0
 """A stall takes more than so many times the usual wait for a new frame. Ours, as of a gap."""
 _LEAP, _ALIKE = 2.0, 3.0
-"""Across a stall a channel moves by so many times its steps before and after, and about as fast: by
-at most so many times or parts. Ours."""
+"""Across a stall a channel moves by so many times its steps around, and about as fast. Ours."""
 _MOST, _FEWEST_VALUES = 0.9, 12
 """Values that are held for about one number of frames, of at least so many. Ours."""
 

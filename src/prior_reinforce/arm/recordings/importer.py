@@ -331,8 +331,7 @@ class Recordings:
         """Make plans of these recordings, or of some of them, and join them with their outcomes.
 
         Raises:
-            InvalidDemonstrationsError: As in `outcomes_of` and `inspect`, or a motion that comes
-                twice.
+            InvalidDemonstrationsError: As in `outcomes_of` and `inspect`, or a motion twice.
         """
         back = partial(ways_back, selection.recordings)
         seen, sd = outcomes_of(selection.episodes, outcomes, back)  # first, as the rest is slow

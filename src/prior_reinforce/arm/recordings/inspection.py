@@ -49,8 +49,7 @@ _TAKE_IT = (
 _MUCH_NOISE = 0.25
 """Share of a limit consumed by noise alone, above which it is reported. Ours."""
 _OFF = 0.01
-"""By which a held joint may be off, in [m] and [rad]. Ours: a lift's play and its encoder's noise;
-at an arm's length 0.01 rad is as much."""
+"""By which a held joint may be off, in [m] and [rad]. Ours: a lift's play and encoder noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -327,12 +326,8 @@ def inspect(selection: Selection, wanted: Wanted) -> Inspection:
 def check_held(recordings: Sequence[Recording], robot: RobotLimits | None) -> None:
     """Check that joints that the robot holds still stand in the recordings where it says.
 
-    Columns without a unit are in m and rad, or where they are too large for these in another: a
-    lift that is held at 0.35 m may be recorded as 350.
-
     Raises:
-        InvalidDemonstrationsError: One stands elsewhere, or moves: the arm's reach and its box
-            would be wrong.
+        InvalidDemonstrationsError: One stands elsewhere, or moves: the arm's reach would be wrong.
     """
     held = {} if robot is None else robot.held
     joints = list(held)
@@ -359,7 +354,7 @@ def check_held(recordings: Sequence[Recording], robot: RobotLimits | None) -> No
 
 
 def _stands_at(at: float, column: str, low: float, high: float) -> bool:
-    """Whether a column stays at a place, in the unit that it states, or in one that it may have."""
+    """Whether a column stays at a place: a lift at 0.35 m may be 350 there, without a unit."""
     unit = split_unit(column, CHANNEL_UNITS)[1]
     usual = max(abs(low), abs(high)) <= UNITS["rad"].largest
     units = [unit] if unit else ["m", "rad"] if usual else CHANNEL_UNITS

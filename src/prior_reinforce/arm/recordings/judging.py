@@ -130,8 +130,7 @@ class Judge:
     def far(self) -> list[Belief]:
         """Angles that are in degrees, not in radians as believed, and those that share their unit.
 
-        Joints of one recorder have one unit, unless few of them only are out of range: then those
-        that are numbered like these.
+        Joints of one recorder have one unit; if few are out of range, those numbered like these.
         """
         far = [one for one in self.angles if self._looks(one) not in (one.unit, None)]
         near = max((one.largest for one in self.angles if one not in far), default=0.0)

@@ -25,11 +25,9 @@ steps by less, and a counter that starts again by nearly all."""
 _TIMES = 10.0
 """And so many times what the channel moves in that time before and after. Ours."""
 _FRAMES = (4, 8, 16, 32)
-"""Frames before and after a leap that may show how the channel moves: few where it is fast, many
-where it counts slowly."""
+"""Frames before and after a leap that may show how the channel moves: few where it is fast."""
 _STRAIGHT = 0.15
-"""Share of what a channel moves in these frames by which it may be off a line, rms: noise at rest
-is off by more. Ours."""
+"""Share of what it moves in these frames by which it may be off a line, rms; noise is. Ours."""
 _NOISE = 6.0
 """And it moves by so many standard deviations of its noise. Ours."""
 _ALIKE = 3.0
@@ -37,8 +35,7 @@ _ALIKE = 3.0
 _COUNTS = (*(2.0**n for n in range(8, 25)), 360.0, 3600.0)
 """Counts at which counters and encoders start again."""
 _NEAR = 0.05
-"""Share of these that a counter may miss just before it starts again. Ours: it is fast, or slow to
-be read."""
+"""Share of these that a counter may miss just before it starts again, as it is fast. Ours."""
 
 Values = Float[np.ndarray, " T"]
 """One channel at these times."""

@@ -141,9 +141,8 @@ def _clock(
 ) -> Clock:
     """Times by the frames' own numbers, since some may be missing, if their stamps agree with it.
 
-    LeRobot writes number / fps as `timestamp`; converters and other recorders write when a frame
-    was taken, which counts where the rate is right and frames came late. What else tells the time
-    is held against it.
+    LeRobot writes number / fps as `timestamp`; other recorders write when a frame was taken, which
+    counts where frames came late. What else tells the time is held against it.
     """
     asked = options.time_column not in (None, NO_COLUMN)
     stamps = clocks.get(_STAMPS, index / rate)

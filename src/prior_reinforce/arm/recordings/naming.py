@@ -75,8 +75,7 @@ def joint_vectors(names: Sequence[str], count: int) -> dict[str, list[int]]:
 def numbered_like(joints: Sequence[str], there: Sequence[str]) -> tuple[str, ...] | None:
     """Return the group of as many numbered channels as joints; None if it is not clear which.
 
-    Of several groups of that size, one named like positions is taken: `q` beside `a`; `dq` or `tau`
-    never.
+    Of several such groups, one named like positions is taken: `q` beside `a`; `dq` or `tau` never.
     """
     fitting = joint_vectors(there, len(joints))
     called = [stem for stem in fitting if _POSITIONS.search(stem) is not None]

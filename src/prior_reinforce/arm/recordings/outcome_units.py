@@ -21,14 +21,12 @@ from prior_reinforce.units import base_of, factor, kind_of, looks_like, units_of
 from prior_reinforce.wording import listed
 
 _FAR, _FEW = 10.0, 3
-"""Times as far as all others that an outcome is in another unit, and outcomes of which it is not
-yet known how far they lie apart. Ours."""
+"""Times as far as all others that an outcome is in another unit, and outcomes that tell. Ours."""
 _AMONG = 1.25
 """Times farther or nearer than all others that one is still among them. Ours."""
 _INCHES = " (or inches: --outcome-unit in)"
 _NEAR_THE_BASE = 0.05
-"""So near the base along a component, in [m], hardly any table of outcomes stays. Ours: a throw
-straight ahead scatters as much to the side; then the units are to be said in the head."""
+"""So near the base along a component, in [m], hardly any table of outcomes stays. Ours."""
 
 
 def in_units(
@@ -122,9 +120,6 @@ def in_units(
 
 def _refuse_one_unit(outcomes: Outcomes, wanted: Sequence[str], unclear: Sequence[str]) -> None:
     """Refuse components that look like several units, of which no option can give each its own.
-
-    So do numbers of which some are plausible as they are: were all in the unit that the others look
-    like, the object would hardly leave the base along them.
 
     InvalidDemonstrationsError says the option if all are in one, and what to write in the head.
     """

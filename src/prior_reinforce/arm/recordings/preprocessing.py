@@ -107,8 +107,7 @@ def preprocess(
         settings: How to trim, resample and smooth them.
 
     Raises:
-        InvalidDemonstrationsError: An episode that never moves, is longer than the horizon, or
-            leaps in mid-motion.
+        InvalidDemonstrationsError: An episode never moves, exceeds the horizon, or leaps.
     """
     refuse_leaps(recordings, units)
     dt = settings.dt or _common_dt(recordings)

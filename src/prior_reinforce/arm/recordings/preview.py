@@ -133,14 +133,7 @@ class Preview:
         return self.text
 
     def draw(self, path: str | os.PathLike[str] | None = None) -> Figure:
-        """Draw every joint over time, and the outcomes with their hull.
-
-        Args:
-            path: Where to write it (PNG), if given.
-
-        Returns:
-            The matplotlib figure.
-        """
+        """Draw joints over time, and outcomes with their hull; as a PNG at `path`, if given."""
         from matplotlib import colormaps, rc_context
         from matplotlib.figure import Figure
 

@@ -220,8 +220,7 @@ def unread() -> Recording:
 def without_units(names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str | None, ...]]:
     """Return names without units, and the units; names that would then coincide all stay.
 
-    A word in square brackets is a unit though it is not known, `pressure [bar]`, unless it is what
-    tells names apart, as in `q[elbow]`.
+    A word in square brackets is a unit, `pressure [bar]`, unless it tells names apart: `q[elbow]`.
     """
     for any_word in (True, False):
         split = [split_unit(name, CHANNEL_UNITS, any_word=any_word) for name in names]

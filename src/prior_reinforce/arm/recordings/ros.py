@@ -221,8 +221,7 @@ def _fields(message: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 def _beside(topic: str, messages: Sequence[Message]) -> dict[str, Beside]:
     """The numbers of a topic; what moves is the only one, or only list of numbers, that does.
 
-    Several in one message are mostly a pose, or what a driver says of itself; but where a base
-    stands is named, number by number.
+    Several in one message are mostly a pose, or of a driver; but where a base stands is named.
     """
     names = messages[0].content.name if messages else []
     rows = [m.content.position for m in messages]

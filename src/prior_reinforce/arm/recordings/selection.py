@@ -85,8 +85,7 @@ def select(
 
     Raises:
         InvalidDemonstrationsError: A joint that a recording lacks, or too many lost frames.
-        ConfigurationError: Another number of names or units than of joints, or units that
-            contradict each other.
+        ConfigurationError: Another number of names or units than of joints, or units that differ.
     """
     joints = tuple(joints) if joints is not None else recordings[0].names
     if _are_all_columns(joints, recordings, names):

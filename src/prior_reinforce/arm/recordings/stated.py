@@ -1,7 +1,6 @@
 """What a file says of the motion that it holds: its names and units, its rate, its length.
 
-Recorders call these things as they like. So they are told by what they hold: names are texts, as
-many as the columns.
+Recorders call it as they like, so it is told by what it holds: names are as many as columns.
 """
 
 from __future__ import annotations
@@ -128,9 +127,8 @@ def recorded_among(
 ) -> Recording:
     """Return the recording whose motion is the arrays `keys`, (T,) or (T, D), side by side.
 
-    `arrays` are all that may say something of it, `texts` what the file says in words, and `stated`
-    further numbers, of which one may count frames, or be the rate. `names` are those of the columns
-    if they are known.
+    `arrays` are all that may say something of it, `texts` what the file says in words, `stated`
+    further numbers, such as a rate. `names` are those of the columns, if they are known.
     """
     count = len(arrays[keys[0]])
     stated = stated or {}

@@ -45,8 +45,7 @@ _DATE = re.compile(r"\d{4}-\d\d-\d\d|\d{1,2}:\d\d|\d{1,2}[/.]\d{1,2}[/.]\d{4}")
 _THOUSANDS = re.compile(
     r"[+-]?\d{1,3}(?:(['’\u00a0\u202f])\d{3}(\1\d{3})*([.,]\d*)?|( \d{3})+[.,]\d+)"
 )
-"""Numbers whose thousands are apart by a mark that no decimal sign is: `1'012.5`, `1 012,5`. Whole
-numbers with blanks between are a list."""
+"""Numbers whose thousands are apart by a mark that no decimal sign is: `1'012.5`, `1 012,5`."""
 _FORTRAN = re.compile(r"^([+-]?[\d.]+)[dD]([+-]?\d+)$")
 """`1.2D-01`."""
 _MOMENT = re.compile(

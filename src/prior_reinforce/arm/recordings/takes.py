@@ -1,7 +1,6 @@
 """Takes that are not as the others: in their units, numbers or times, or in where they start or go.
 
-Nothing is converted by what another take states. A take that may be in another unit is named, and
-can be left out.
+Nothing is converted by what another take states: what may be in another unit is asked about.
 """
 
 from __future__ import annotations
@@ -174,8 +173,7 @@ def apart_from_most(reach: Mapping[str, float], unit: str) -> tuple[str, ...]:
 def doubts_of_times(recordings: Sequence[Recording]) -> list[Ambiguity]:
     """What is only guessed of the times, one doubt for each option.
 
-    Where some takes only are in another unit, the fewer are to be left out: no option holds for
-    all.
+    Where only some takes are in another unit, no option holds for all: the fewer are left out.
     """
     found = {one.option: one for r in reversed(recordings) for one in r.ambiguities}
     for option, doubt in list(found.items()):
@@ -289,8 +287,7 @@ def several_throws(recording: Recording) -> tuple[Ambiguity, ...]:
 def pauses(recordings: Sequence[Recording]) -> Iterator[str]:
     """Say it if every recording rests between motions, and does not end where it began.
 
-    An approach and a throw do so, and a throw and a retreat; the fastest is the likely throw. Of a
-    way back, `all_return` tells.
+    Of an approach, a throw and a retreat, the fastest is the likely throw.
     """
     throws, others = list[str](), list[str]()
     for recording in recordings:

@@ -68,10 +68,9 @@ class FoundTimes(NamedTuple):
 def find_times(where: object, columns: Columns, called: Collection[Any]) -> FoundTimes:
     """Return the times among columns, none of which is a joint, by what their names say.
 
-    The first counts of those that are `called` so for certain, or rise steadily and say in some
-    language that they are a time; else of those that say so and rise, which is asked about, or
-    fall; else periods, which are summed. FileFormatError if columns of one name are times that
-    differ.
+    The first counts of those that are `called` so for certain, or rise steadily and say that they
+    are a time; else of those that say so and rise, which is asked about, or fall; else periods,
+    which are summed. FileFormatError if columns of one name are times that differ.
     """
     times = [*called, *(i for i, each in columns.items() if tells_time(*each))]
     increasing = [

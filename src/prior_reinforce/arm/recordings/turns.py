@@ -71,8 +71,7 @@ def aligned(
     signs of demonstrations that were there `before`, which stay as they are.
 
     Raises:
-        InvalidDemonstrationsError: It cannot be told which way round a joint went, or which of two
-            turns an episode is in.
+        InvalidDemonstrationsError: It cannot be told which way round a joint went.
     """
     shown = () if before is None else before.plans
     episodes = [*so_far(len(shown)), *selection.episodes]
@@ -139,16 +138,7 @@ def _align(
 ) -> tuple[PlanFormat, list[str]]:
     """Bring motions together in place; return their format with all attitudes, and what was done.
 
-    Args:
-        form: What their channels mean, with the attitudes that are known.
-        episodes: What to call them.
-        motions: N of them.
-        limits: Of the robot whose joints they move.
-        angles: Channels that are known to be angles, whatever their names.
-        fixed: How many, the first ones, are in use, and stay as they are: 0 or more.
-
-    Raises:
-        InvalidDemonstrationsError: As in `aligned`.
+    `angles` are channels that are known to be angles; the `fixed` first motions stay.
     """
     for size, are in ((4, _are_quaternions), (3, _start_at_two_forms)):
         taken = {*form.periodic, *chain(*form.attitudes)}

@@ -1,7 +1,6 @@
 """Units of recordings: read from names, converted, and judged by what an arm can do.
 
-No guess is silent. Each is an `Ambiguity`: what is implausible, what it looks like, and the option
-that settles it.
+No guess is silent: each is an `Ambiguity`, with the option that settles it.
 """
 
 from __future__ import annotations
@@ -45,8 +44,7 @@ _NO_ENDING = {
 _BEFORE_NUMBER = re.compile(r"(?P<name>.+?)_(?P<unit>deg|rad|mm|cm)(?P<number>_?\d+)", re.I)
 """`q_deg_0`."""
 _UNKNOWN = re.compile(r"(?P<name>.+?)\s*\[\s*(?P<unit>[^\[\]]*[^\W\d_][^\[\]]*?|%)\s*\]")
-"""`pressure [bar]` or `x [cm ahead]`, in a unit that this program does not know: whatever holds a
-letter; `x[0]` is a name."""
+"""`pressure [bar]` or `x [cm ahead]`, in an unknown unit: what holds a letter, unlike `x[0]`."""
 
 
 @dataclass(frozen=True)
@@ -88,8 +86,7 @@ def split_unit(
     """Split a column's name `x_cm`, `q0 [deg]` or `time (ms)` into the name and the unit in it.
 
     `among` are units that may stand there, in brackets also behind a number, `(0.001deg)`; with
-    `any_word` so is whatever holds a letter in square brackets: `volume [ml]`. Without such a unit,
-    the whole name and None.
+    `any_word` so is any word in square brackets, `volume [ml]`. Without one, the name and None.
     """
     for pattern in (_BRACKETS, _ENDING, _BEFORE_NUMBER, _CAMEL):
         match = pattern.fullmatch(column.strip())
@@ -127,9 +124,8 @@ def judge_unit(
 ) -> str | None:
     """Return the unit that a number looks like: the same if that is plausible, None if none fits.
 
-    The number is the largest absolute angle or length in `rad`, `m` or percent (other units are
-    plausible all, and so is 0), a gripper's `opening`, or a `period` between two frames in a unit
-    of time.
+    The number is the largest absolute angle, length or share (other units are plausible all, and so
+    is 0), a gripper's `opening`, or a `period` between two frames in a unit of time.
     """
     if number == 0 and not period:
         return unit
