@@ -14,11 +14,7 @@ import numpy as np
 from prior_reinforce.arm.recordings.naming import OTHER_NAMES
 from prior_reinforce.arm.recordings.time_finder import (
     COUNTER,
-    FASTEST,
     FRAME,
-    LONGEST,
-    SHORTEST,
-    SLOWEST,
     Columns,
     FoundTimes,
     Stamps,
@@ -26,6 +22,8 @@ from prior_reinforce.arm.recordings.time_finder import (
     are_ticks,
     find_times,
     is_periods,
+    is_rate,
+    is_throw,
     other_times,
     rises,
     says_period,
@@ -339,11 +337,11 @@ def hold_together(where: str, clocks: Mapping[str, Times]) -> None:
 
 def _doubt_rate(name: str, rate: float, count: int) -> tuple[Ambiguity, ...]:
     """Doubt a declared rate at which no arm is recorded: `dt` 20 is in milliseconds, or a rate."""
-    if SLOWEST <= rate <= FASTEST:
+    if is_rate(rate):
         return ()
     in_units = [rate / scale for unit, scale in SECONDS.items() if unit not in ("min", "h")]
     others = [1 / rate, *in_units] if _RATE.fullmatch(name.lower()) else [*in_units, 1 / rate]
-    likely = [other for other in others if SLOWEST <= other <= FASTEST] or [rate]
+    likely = list(filter(is_rate, others)) or [rate]
     what = f"{name} in the file says {rate:.4g} frames a second, {count / rate:.4g} s in all"
     what += ": it looks like " + " or ".join(f"{other:.4g}" for other in likely)
     return (Ambiguity(what, f"--rate {likely[0]:.6g}"),)
@@ -367,9 +365,9 @@ def _judge(
     looks = judge_unit(unit, period, period=True)
     if looks == unit or period <= 0:
         return unit, ()
-    is_throw = looks is not None and SHORTEST <= length * SECONDS[looks] <= LONGEST
-    plausible = SLOWEST <= 1 / (period * SECONDS[unit]) <= FASTEST
-    if said is not None and (plausible or not is_throw):
+    if said is not None and (
+        is_rate(1 / (period * SECONDS[unit])) or not (looks and is_throw(length * SECONDS[looks]))
+    ):
         return said, ()  # believed, unless another unit makes it the length of a throw
     as_said = f", as {by}," if said is not None else ""
     what = f"{name} in {unit}{as_said} would be {rate_in(unit)}, "
@@ -385,7 +383,7 @@ def _judge(
         return "s", (Ambiguity(what, "--time-unit frame --rate HZ", guessed=False),)
     if said is None and period == 1:
         what += " (or it counts frames: --time-unit frame --rate HZ)"
-    elif said is None and "tick" in name.lower() and SLOWEST <= 1e7 / period <= FASTEST:
+    elif said is None and "tick" in name.lower() and is_rate(1e7 / period):
         what = f"{name} steps by {period:g}, and nothing says how long a tick is"
         what += " (.NET's are 100 ns: then write that column in ns, times 100)"
         return "s", (Ambiguity(what, "--time-unit UNIT", guessed=False),)

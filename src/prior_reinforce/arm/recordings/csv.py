@@ -44,14 +44,7 @@ from prior_reinforce.arm.recordings.table_times import (
     time_columns,
     with_whole_dates,
 )
-from prior_reinforce.arm.recordings.tables import (
-    PLAIN,
-    Table,
-    are_units,
-    is_unnamed,
-    is_value,
-    read_table,
-)
+from prior_reinforce.arm.recordings.tables import PLAIN, Table, are_units, is_value, read_table
 from prior_reinforce.arm.recordings.time_finder import FEWEST_COUNTS, Times
 from prior_reinforce.arm.recordings.units import Ambiguity, known_unit, say_names
 from prior_reinforce.errors import FileFormatError
@@ -251,7 +244,7 @@ def _episode(
     _refuse_second_log(table, clock.times if times.columns else np.zeros(len(table)))
     counts = [i for i in others if table.is_number(i) and counts_rows(table, i, clock.times)]
     plain = channels == others and table.named and not options.joints
-    rising = [i for i in counts if plain or (i in channels and is_unnamed(table.names[i]))]
+    rising = [i for i in counts if plain or (i in channels and table.is_unnamed(i))]
     all_read = not options.key and found is None
     texts = [i for i in others if table.is_text(i)]
     if not all_read:  # else only those that change between a few: `on` and `off`
@@ -270,8 +263,7 @@ def _episode(
     own_names = [said.get(i, name) for i, name in zip(channels, own, strict=True)]
     if not is_named:  # by their places in the file
         own_names = [] if table.named else [called[i].replace(" ", "") for i in channels]
-    unnamed = [i for i in counts if is_unnamed(table.names[i])]
-    rest = [i for i in others if i not in channels and i not in unnamed]
+    rest = [i for i in others if i not in channels and not (i in counts and table.is_unnamed(i))]
     return recorded(
         episode,
         clock,

@@ -153,7 +153,8 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             continue
         for index, message in enumerate(messages):
             episode = name if len(messages) == 1 else f"{name}-{index}"
-            yield episode, partial(_trajectory, bag, episode, message.content, options)
+            read_one = partial(read_trajectory, bag, episode, message.content, options)
+            yield episode, named_damage(bag, _BAG)(read_one)
 
 
 def _bags_at(source: Path) -> list[Path]:
@@ -436,8 +437,3 @@ def _clock_of(
             f"{came[-1] * 1e-9:.3g} s; say which are right: --time-column {_HEADER}, or {_RECORDER}"
         )
     return *names[_HEADER], []
-
-
-def _trajectory(bag: Path, episode: str, message: Any, options: ReadOptions) -> Recording:
-    with named_damage(bag, _BAG):
-        return read_trajectory(bag, episode, message, options)

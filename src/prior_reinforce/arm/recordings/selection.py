@@ -21,12 +21,7 @@ from prior_reinforce.arm.recordings.naming import (
 )
 from prior_reinforce.arm.recordings.recording import Recording, or_leave_out
 from prior_reinforce.arm.recordings.takes import in_one_unit, odd_takes
-from prior_reinforce.arm.recordings.units import (
-    Ambiguity,
-    conversion,
-    say_names,
-    split_unit,
-)
+from prior_reinforce.arm.recordings.units import Ambiguity, conversion, say_names, split_unit
 from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.plans.whole_turns import TURN

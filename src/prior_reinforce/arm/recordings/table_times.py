@@ -19,7 +19,7 @@ from prior_reinforce.arm.recordings.clock import (
     declared_rate,
 )
 from prior_reinforce.arm.recordings.options import ReadOptions
-from prior_reinforce.arm.recordings.tables import Column, Table, is_unnamed
+from prior_reinforce.arm.recordings.tables import Column, Table
 from prior_reinforce.arm.recordings.time_finder import (
     FEWEST_COUNTS,
     FRAME,
@@ -129,7 +129,7 @@ def time_columns(
     if (pair := _seconds_and_parts(table)) is not None:
         return pair
     free = _columns(table, [i for i in range(len(table.names)) if i not in others])
-    dated = [i for i in free if is_unnamed(table.names[i]) and table.nanoseconds(i) is not None]
+    dated = [i for i in free if table.is_unnamed(i) and table.nanoseconds(i) is not None]
     called = [i for i in (*called, *(i for i in dated if rises(free[i][1]))) if i in free]
     found = find_times(table.where, free, called)
     if found.columns:
@@ -161,7 +161,7 @@ def _seconds_and_parts(table: Table) -> FoundTimes | None:
 
 def counts_rows(table: Table, column: int, times: Times) -> bool:
     """Whether a column counts rows or tells the time, which no joint does."""
-    if is_unnamed(table.names[column]):
+    if table.is_unnamed(column):
         return rises(table.stamps(column))
     long = len(table) >= FEWEST_COUNTS
     return long and is_clock(table.names[column], table.values[:, column], times)

@@ -64,6 +64,7 @@ _NAN = ("nan", "+nan", "-nan")
 _NONE = ("none", "null", "na", "n/a", "-", "inf", "-inf")
 _DAY = 86_400 * 10**9
 """In [ns]."""
+_NO_NAME = re.compile(r"(Unnamed:.*)?")
 _SECOND_ROW_OF_UNITS = re.compile(r"[\[(]?[A-Za-zµμ°/^*·0-9.%-]{0,12}[\])]?")
 
 
@@ -124,6 +125,10 @@ class Table:
     def columns(self, chosen: Sequence[int]) -> Float[np.ndarray, "T D"]:
         """Return some columns as numbers, as `numbers` does."""
         return np.column_stack([self.numbers(i) for i in chosen] or [np.zeros((0, 0))])
+
+    def is_unnamed(self, column: int) -> bool:
+        """Whether a column has no name, as pandas writes an index."""
+        return _NO_NAME.fullmatch(self.names[column]) is not None
 
     def is_number(self, column: int) -> bool:
         """Whether every cell of a column is a number."""
@@ -439,13 +444,8 @@ def are_units(cells: list[str], decimal: str) -> bool:
     )
 
 
-def is_unnamed(name: str) -> bool:
-    """Whether a column has no name, as pandas writes an index."""
-    return not name or name.startswith("Unnamed:")
-
-
 def _is_padding(name: str, column: Sequence[str]) -> bool:
     """Whether a column is what a trailing delimiter leaves, or the running count of pandas."""
-    if is_unnamed(name) or name == "index":
+    if _NO_NAME.fullmatch(name) or name == "index":
         return not any(column) or list(column) == [str(i) for i in range(len(column))]
     return not any(column) and name.startswith("column ")

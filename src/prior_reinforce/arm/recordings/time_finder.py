@@ -28,9 +28,11 @@ COUNTER = re.compile(
     r"(^|[^a-z])(seq|frame|sample|index|idx|count|counter|tick|row|nr|step)s?($|[^a-z])"
 )
 """Names of columns that count frames."""
-SHORTEST, LONGEST = 0.1, 60.0
-"""Seconds that a throw, slide or swing is recorded for. Ours, and wide on purpose."""
-SLOWEST, FASTEST = 1.0, 1e4
+LONGEST = 60.0
+"""Seconds that a throw, slide or swing is recorded for, at most. Ours, and wide on purpose."""
+_SHORTEST = 0.1
+"""And at least. Ours."""
+_SLOWEST, _FASTEST = 1.0, 1e4
 """Frames a second beyond which a rate or a unit is doubted although somebody says it. Ours."""
 _SAYS_TIME = re.compile(
     r"(^|[^a-z])(t|ts|times?|timestamps?|stamp|epoch|clock|elapsed|duration|date|secs?|seconds?)"
@@ -105,8 +107,9 @@ def other_times(
     counter, and beside a rate run nearly as fast.
     """
     rising = [i for i, (_, own) in columns.items() if rises(own)]
-    if rate is not None or in_arrays:  # what counts frames one by one says nothing
-        rising = [i for i in rising if not counts_all(columns[i][1])]
+    if rate is not None or in_arrays:  # what counts frames one by one, or few, says nothing
+        long = [i for i in rising if len(columns[i][1]) >= FEWEST_COUNTS]
+        rising = [i for i in long if np.any(np.diff(columns[i][1]) != 1)]
     if in_arrays:
         rising = [i for i in rising if not COUNTER.search(columns[i][0].lower())]
         rising = [i for i in rising if rate is None or _runs_at(rate, columns[i][1])]
@@ -138,6 +141,16 @@ def _refuse_several(where: object, times: Sequence[tuple[str, Stamps]]) -> None:
                 "each channel has its own times; write all at the times of one: numpy.interp(its "
                 "times, their own times, their values)"
             )
+
+
+def is_rate(hertz: float) -> bool:
+    """Whether an arm may be recorded at so many frames a second."""
+    return _SLOWEST <= hertz <= _FASTEST
+
+
+def is_throw(seconds: float) -> bool:
+    """Whether a recording may last so long."""
+    return _SHORTEST <= seconds <= LONGEST
 
 
 def says_time(name: str) -> bool:
@@ -174,11 +187,6 @@ def counts_down(name: str, values: Stamps) -> bool:
     return says_time(name) and rises(-values.astype(float))
 
 
-def counts_all(values: Stamps) -> bool:
-    """Whether a column may count frames one by one, or is too short to tell."""
-    return len(values) < FEWEST_COUNTS or bool(np.all(np.diff(values) == 1))
-
-
 def _runs_at(rate: float, stamps: Stamps) -> bool:
     """Whether a column rises, in some unit of time, about as fast as frames come at a rate."""
     step = float(np.median(np.diff(stamps.astype(float))))
@@ -199,7 +207,7 @@ def are_ticks(values: Stamps) -> bool:
     if values.size < 2 or values.min() < _TICKS[0] or values.max() > _TICKS[1]:
         return False
     length = 1e-9 * float(values.max() - values.min())
-    return length < SHORTEST or values.size / length > FASTEST
+    return length < _SHORTEST or values.size / length > _FASTEST
 
 
 def is_clock(name: str, values: Times, times: Times) -> bool:
