@@ -33,8 +33,8 @@ from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.errors import FileFormatError
 
 FrameNumbers = Shaped[np.ndarray, " T"]
-Frames = tuple[FrameNumbers, Times | None, dict[str, Positions]]
-"""Numbers, stamps and features of an episode's frames."""
+Frames = tuple[FrameNumbers, dict[str, Positions]]
+"""Numbers and features of an episode's frames."""
 _MEASURED, _COMMANDED, _STAMPS = "observation.state", "action", "timestamp"
 _OWN = (_STAMPS, "frame_index", "episode_index", "index", "task_index")
 """Features that every data set has."""
@@ -80,10 +80,11 @@ def read(source: Path, options: ReadOptions) -> Episodes:
     remarks: tuple[str, ...] = ()
     if not options.key and key == _MEASURED and _COMMANDED in features:
         remarks = (f"motion is {_MEASURED} (measured); key {_COMMANDED} has the commanded one",)
-    lengths, frames = _listed_lengths(source), _frames(source, (*keys, *beside))
+    columns = dict.fromkeys((*keys, *beside, _STAMPS))
+    lengths, frames = _listed_lengths(source), _frames(source, tuple(columns))
 
     def episode_of(number: int) -> Recording:
-        index, stamps, arrays = frames.get(number, (np.zeros(0), None, {}))
+        index, arrays = frames.get(number, (np.zeros(0), {}))
         listed = lengths.get(number, len(index))
         if len(index) != listed or listed == 0:
             raise FileFormatError(
@@ -92,9 +93,9 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             )
         own = texts[f"{key} names"]
         said = {"names": own} if len(own) == arrays[key].shape[1] else texts
-        clocks = {_STAMPS: stamps} if stamps is not None else {}
-        clocks |= {n: a.ravel() for n, a in arrays.items() if a.size == len(a) and n not in keys}
+        clocks = {n: a.ravel() for n, a in arrays.items() if a.size == len(a) and n not in keys}
         clock = _clock(source, str(number), index, clocks, rate, options)
+        arrays = {n: a for n, a in arrays.items() if n != _STAMPS or n in keys}
         return recorded_among(
             source, str(number), keys, arrays, options, texts=said, clock=clock, remarks=remarks
         )
@@ -185,7 +186,7 @@ def _listed_lengths(source: Path) -> dict[int, int]:
 
 
 def _frames(source: Path, keys: tuple[str, ...]) -> dict[int, Frames]:
-    """Frame numbers, stamps if there are any, and features of each episode, in time order."""
+    """Frame numbers and features of each episode, in time order; stamps if there are any."""
     paths = sorted((source / "data").glob("**/*.parquet"))
     if not paths:
         raise FileFormatError(
@@ -194,27 +195,25 @@ def _frames(source: Path, keys: tuple[str, ...]) -> dict[int, Frames]:
     parts = []
     for path in paths:
         with named_damage(path, "LeRobot frames, complete once its recorder called finalize()"):
-            table = _table(path, ["episode_index", "frame_index", _STAMPS, *keys])
+            table = _table(path, ["episode_index", "frame_index", *keys])
             episode = table["episode_index"].to_numpy().astype(np.int64)
             index = table["frame_index"].to_numpy().astype(np.int64)
+            none = np.full((len(index), 1), np.nan)
+            own = (_rows(table[key]) if key in table.column_names else none for key in keys)
             if len(episode) > 0:
-                there = _STAMPS in table.column_names
-                stamps = _rows(table[_STAMPS])[:, 0] if there else np.full(len(index), np.nan)
-                parts.append((episode, index, stamps, *(_rows(table[key]) for key in keys)))
+                parts.append((episode, index, *own))
     if not parts:
         return {}
     with named_damage(source, f"LeRobot data with one width of {keys[0]}"):
-        episode, index, stamps, *values = map(np.concatenate, zip(*parts, strict=True))
+        episode, index, *values = map(np.concatenate, zip(*parts, strict=True))
     order = np.argsort(index, kind="stable")
-    own = {number: order[episode[order] == number] for number in np.unique(episode).tolist()}
-    said = bool(np.all(np.isfinite(stamps)))
+    found = dict(zip(keys, values, strict=True))
+    if not np.all(np.isfinite(found[_STAMPS])):
+        del found[_STAMPS]
     return {
-        number: (
-            index[rows],
-            stamps[rows] if said else None,
-            {key: value[rows] for key, value in zip(keys, values, strict=True)},
-        )
-        for number, rows in own.items()
+        number: (index[rows], {key: value[rows] for key, value in found.items()})
+        for number in np.unique(episode).tolist()
+        for rows in [order[episode[order] == number]]
     }
 
 
