@@ -21,13 +21,14 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from prior_reinforce.arm.recordings.numbering import (
+from prior_reinforce.arm.recordings.outcome_names import (
+    columns_of,
     digits_at_end,
     how_to_renumber,
     number_of,
+    remedy_for,
     telling_word,
 )
-from prior_reinforce.arm.recordings.outcome_columns import columns_of, remedy_for
 from prior_reinforce.arm.recordings.recording import ROW_COLUMNS
 from prior_reinforce.arm.recordings.tables import Table, read_table
 from prior_reinforce.arm.recordings.units import (
@@ -97,13 +98,10 @@ class Outcomes:
     """Warnings for a person."""
 
     def only(self, names: Sequence[str]) -> Outcomes:
-        """Return some of the components, in that order.
+        """Return some components, in that order; InvalidDemonstrationsError if one is missing.
 
         A column may be called by where it counts up to, as seen from the base: `ahead` is x, `left`
         y, and `right` is y of the opposite sign.
-
-        Raises:
-            InvalidDemonstrationsError: One is missing.
         """
         columns = columns_of(names, self.names)
         missing = [name for name, found in columns.items() if not found]
@@ -132,11 +130,7 @@ class Outcomes:
 
     @classmethod
     def of_numbers(cls, where: str, numbers: Mapping[str, Sequence[float]]) -> Outcomes:
-        """Outcomes that are numbers by episode.
-
-        Raises:
-            InvalidDemonstrationsError: Different numbers of components.
-        """
+        """Outcomes by episode; InvalidDemonstrationsError if they differ in components."""
         lengths = set(map(len, numbers.values())) or {0}
         if len(lengths) != 1 or (0 in lengths and numbers):
             raise InvalidDemonstrationsError(
@@ -184,8 +178,7 @@ def keep_places(
 ) -> None:
     """Write a table of places by episode, as `import` reads it, and the source of the episodes.
 
-    Raises:
-        WorkspaceError: The disk is full, or the folder read-only.
+    WorkspaceError if the disk is full, or the folder read-only.
     """
     units, beside = form.units, () if source is None else (source.resolve(),)
     rows = {episode: (*map(repr, place), *beside) for episode, place in places.items()}
@@ -358,8 +351,7 @@ def check_rows(
     Returns the outcomes with the `word` that holds for the episodes.
 
     Raises:
-        InvalidDemonstrationsError: A row is of none; so is the last if the rows are numbered from 1
-            and the episodes from 0; or several numbers in the names fit, as in `telling_word`.
+        InvalidDemonstrationsError: A row is of none, or several numbers fit (`telling_word`).
     """
     rows = outcomes.episodes
     word = telling_word(outcomes.word, chosen, there, rows)
@@ -385,9 +377,7 @@ def in_order(source: Path, motions: Sequence[str], outcomes: Outcomes, advice: s
     """Match outcomes of the motions that one file was cut into in their order.
 
     That is the order of the numbers that end their names, or of their rows.
-
-    Raises:
-        InvalidDemonstrationsError: They are not as many; it ends in the advice, if there is any.
+    InvalidDemonstrationsError ends in the advice, if there is any, where they are not as many.
     """
     rows = outcomes.episodes
     if len(motions) != len(rows):

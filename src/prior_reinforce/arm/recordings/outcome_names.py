@@ -1,4 +1,4 @@
-"""Which number in the names of recordings the rows of a table give."""
+"""Which recording a row of a table of outcomes is of, and which component a column is."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import re
 from collections.abc import Sequence
 
 from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.wording import PLACE_WORDS, axes_of
 
 _DATE = r"(?:(?:19|20)\d\d([-_.]?)[01]\d\1[0-3]\d|[0-3]\d([-_.])[01]\d\2(?:19|20)\d\d)"
 _TIME = r"(?:[T_ .-]?[0-2]\d[-_.:h]?[0-5]\d(?:[-_.:m]?[0-5]\d%s)?)?"
@@ -18,6 +20,13 @@ _DATED = re.compile(f"(?:{_DATE}{_TIME % _PART}|{_PAIRS % _PART})$")
 _DATES = re.compile(f"{_DATE}{_TIME % ''}|{_PAIRS % ''}")
 _NUMBER = re.compile(r"([^\W\d_]*)([\W_]*)0*([0-9]+)")
 """A number, and the word or the signs before it."""
+_RADII = ("r", "radius", "distance", "dist", "range")
+_BEARINGS = ("angle", "bearing", "azimuth", "theta", "phi", "heading", "direction")
+_ERRORS = re.compile(
+    r"(?i)d[xyz]|(.*[^a-z])?(err|errors?|delta|diff|dev|deviation|miss|missed|off|offset|residual|"
+    r"fehler|abweichung)([^a-z].*)?"
+)
+"""Names of what is measured from a target."""
 
 
 def digits_at_end(name: str) -> str:
@@ -47,9 +56,7 @@ def telling_word(
 
     The first counts if it tells the `episodes` apart, unless only the other is `there` for all rows
     that are no whole names, or for all episodes where rows are of others, too.
-
-    Raises:
-        InvalidDemonstrationsError: Other numbers are there for all rows, too; the word decides not.
+    InvalidDemonstrationsError if other numbers are there for all rows, and the word decides not.
     """
     wanted = {digits_at_end(row) for row in rows if row not in there} - {""}
     if not wanted or not episodes:
@@ -96,3 +103,33 @@ def how_to_renumber(word: str, episodes: Sequence[str], rows: Sequence[str]) -> 
     if first == of_table or len(theirs) > len(ours):
         return ""
     return f"the table begins with {of_table}, and they with {first}: renumber it if so; else "
+
+
+def columns_of(names: Sequence[str], there: Sequence[str]) -> dict[str, list[tuple[int, int]]]:
+    """Return what columns each component may be, with signs: by name, or by where it counts up."""
+    axes = axes_of(OutcomeFormat(tuple(names), ("m",) * len(names)))
+    found = {}
+    for name, axis in zip(names, axes, strict=True):
+        words = PLACE_WORDS[axis] if axis < len(PLACE_WORDS) else ()
+        signs = {name.lower(): 1} | dict(zip(words, (1, -1), strict=False))
+        found[name] = [(i, signs[n.lower()]) for i, n in enumerate(there) if n.lower() in signs]
+    return found
+
+
+def remedy_for(missing: Sequence[str], there: Sequence[str]) -> str:
+    """Say what to do where a table lacks components: a clause."""
+    what, axes = ", ".join(missing), "x is ahead of the base, y to its left"
+    if errors := [name for name in there if _ERRORS.fullmatch(name)]:
+        return (
+            f"{', '.join(errors)} may be measured from a target, and outcomes are places; add the "
+            f"target's place to them, as {what} ({axes})"
+        )
+    if (heights := [name for name in there if name in ("z", "Z")]) and {*missing} <= {"x", "y"}:
+        return (
+            f"{heights[0]} is no {what}; add it, and turn what a camera saw in its own axes into "
+            f"the base's first ({axes})"
+        )
+    polar = ""
+    if {*_RADII}.intersection(there) and {*_BEARINGS}.intersection(there):
+        polar = "; of a distance r and a bearing b to the left, x = r cos b and y = r sin b"
+    return f"rename or add it ({axes}{polar})"

@@ -1,8 +1,14 @@
-"""The number in a recording's name that a row gives."""
+"""Which number in a recording's name a row gives, and what is said where a column is missing."""
 
 import pytest
 
-from prior_reinforce.arm.recordings.numbering import digits_at_end, number_of, telling_word
+from prior_reinforce.arm.recordings.outcome_names import (
+    columns_of,
+    digits_at_end,
+    number_of,
+    remedy_for,
+    telling_word,
+)
 from prior_reinforce.errors import InvalidDemonstrationsError
 
 
@@ -86,3 +92,21 @@ def test_rows_of_other_sources_do_not_hide_that_two_numbers_fit():
 def test_rows_that_say_the_word_themselves_decide():
     names = ["throw_1_take2", "throw_2_take1"]
     assert telling_word("episode", names, names, ["throw_1", "throw_2"]) == "throw"
+
+
+@pytest.mark.parametrize(
+    ("there", "says"),
+    [
+        (["error_x", "error_y"], "error_x, error_y may be measured from a target"),
+        (["dx", "dy"], "to them, as x, y (x is ahead"),
+        (["x", "Z"], "Z is no x, y; add it, and turn"),
+        (["length", "width"], "rename or add it"),
+        (["hose", "coffee"], "rename or add it"),
+    ],
+)
+def test_errors_and_depths_are_not_to_be_renamed(there, says):
+    assert says in remedy_for(["x", "y"], there)
+
+
+def test_a_column_may_be_called_by_where_it_counts_up_to():
+    assert columns_of(["x", "y"], ["X", "right"]) == {"x": [(0, 1)], "y": [(1, -1)]}
