@@ -30,11 +30,7 @@ _STARTS = 0.2
 
 
 def check_scale(before: Demonstrations, selection: Selection) -> None:
-    """Check that recordings have the columns and units of the demonstrations in use.
-
-    Raises:
-        InvalidDemonstrationsError: They have not, or a channel's numbers look like another unit.
-    """
+    """Refuse recordings in other columns or units than those in use: InvalidDemonstrationsError."""
     form = before.format
     _check_alike(
         ("columns", form.names, selection.names), ("plans in", form.units, selection.units)
@@ -48,9 +44,7 @@ def appended(
     """Return demonstrations with more of them; the shorter motions hold their last pose.
 
     Those in use stay as they are, and the new ones, `episodes`, were aligned with them (`inspect`).
-
-    Raises:
-        InvalidDemonstrationsError: They mean other numbers, or have a motion twice.
+    InvalidDemonstrationsError if they mean other numbers, or have a motion twice.
     """
     ours, theirs = before.outcome_format, more.outcome_format
     _check_alike(

@@ -330,8 +330,7 @@ class Recordings:
     ) -> ImportResult:
         """Make plans of these recordings, or of some of them, and join them with their outcomes.
 
-        Raises:
-            InvalidDemonstrationsError: As in `outcomes_of` and `inspect`, or a motion twice.
+        InvalidDemonstrationsError as in `outcomes_of` and `inspect`, or if a motion comes twice.
         """
         back = partial(ways_back, selection.recordings)
         seen, sd = outcomes_of(selection.episodes, outcomes, back)  # first, as the rest is slow

@@ -300,8 +300,7 @@ def inspect(selection: Selection, wanted: Wanted) -> Inspection:
     In units that the gate cannot judge, none is checked.
 
     Raises:
-        InvalidDemonstrationsError: As in `check_held`, `check_scale` and `aligned`; or an episode
-            that never moves, or is longer than the horizon.
+        InvalidDemonstrationsError: As in `check_held`, `check_scale`, `aligned` and `preprocess`.
         ConfigurationError: Settings that contradict each other.
     """
     robot, before = wanted.robot, wanted.before
@@ -324,10 +323,9 @@ def inspect(selection: Selection, wanted: Wanted) -> Inspection:
 
 
 def check_held(recordings: Sequence[Recording], robot: RobotLimits | None) -> None:
-    """Check that joints that the robot holds still stand in the recordings where it says.
+    """Refuse recordings in which a joint that the robot holds still stands elsewhere, or moves.
 
-    Raises:
-        InvalidDemonstrationsError: One stands elsewhere, or moves: the arm's reach would be wrong.
+    InvalidDemonstrationsError, as the arm's reach and its box would be wrong.
     """
     held = {} if robot is None else robot.held
     joints = list(held)

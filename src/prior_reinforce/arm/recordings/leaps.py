@@ -42,11 +42,7 @@ Values = Float[np.ndarray, " T"]
 
 
 def refuse_leaps(recordings: Iterable[Recording], units: Sequence[str]) -> None:
-    """Do nothing if no channel leaps in mid-motion.
-
-    Raises:
-        InvalidDemonstrationsError: One does; it names both values, and what may be done.
-    """
+    """Refuse channels that leap in mid-motion: InvalidDemonstrationsError names both values."""
     for recording in recordings:
         for channels, frame in _leaps(recording, units):
             q, names = recording.positions, [recording.names[i] for i in channels]

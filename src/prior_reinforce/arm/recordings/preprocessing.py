@@ -99,15 +99,9 @@ class Preprocessed:
 def preprocess(
     recordings: Sequence[Recording], units: Sequence[str], settings: Preprocessing
 ) -> Preprocessed:
-    """Trim, resample and bring to one horizon.
+    """Trim and resample N recordings of the same D channels, in `units`, and to one horizon.
 
-    Args:
-        recordings: N of them, each with the same D channels.
-        units: Of the D channels.
-        settings: How to trim, resample and smooth them.
-
-    Raises:
-        InvalidDemonstrationsError: An episode never moves, exceeds the horizon, or leaps.
+    InvalidDemonstrationsError if an episode never moves, exceeds the horizon, or leaps.
     """
     refuse_leaps(recordings, units)
     dt = settings.dt or _common_dt(recordings)

@@ -168,8 +168,7 @@ class Preview:
     def save(self, folder: Path) -> Path:
         """Draw it into a folder, and return the picture's path.
 
-        Raises:
-            WorkspaceError: It cannot be written; an older picture is taken away.
+        WorkspaceError if it cannot be written; an older picture is taken away.
         """
         picture = folder / "demonstrations.png"
         try:

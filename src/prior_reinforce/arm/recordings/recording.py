@@ -86,13 +86,7 @@ class Recording:
     """Whether the file names the channels; false without names."""
 
     def __post_init__(self) -> None:
-        """Copy and check.
-
-        Raises:
-            InvalidDemonstrationsError: Shapes that do not fit, fewer than two frames, repeated
-                names, or times that are not finite or do not increase.
-            FileFormatError: Names that are too long.
-        """
+        """Copy, and refuse what is no recording: InvalidDemonstrationsError, FileFormatError."""
         check_names("a recording", (self.episode, *self.names, *self.columns))
         episode = f"episode {self.episode}"
         try:

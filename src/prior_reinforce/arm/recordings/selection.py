@@ -78,9 +78,8 @@ def select(
     are those of `ReadOptions`, `names` and `plan_units` those of `import_demonstrations`; with
     `normalised`, the recorder also writes shares of each joint's range, -100 to 100.
 
-    Raises:
-        InvalidDemonstrationsError: A joint that a recording lacks, or too many lost frames.
-        ConfigurationError: Another number of names or units than of joints, or units that differ.
+    InvalidDemonstrationsError if a recording lacks a joint, or too many frames; ConfigurationError
+    if names or units are not as many as joints, or units differ.
     """
     joints = tuple(joints) if joints is not None else recordings[0].names
     if _are_all_columns(joints, recordings, names):

@@ -58,10 +58,8 @@ def in_one_unit(
 
     Returns the takes, each converted by what its own file states; the channels' units; a remark on
     each channel that was in several; a doubt on each whose unit some files state and others do not.
-
-    Raises:
-        ConfigurationError: A file states another unit than the one that is given.
-        InvalidDemonstrationsError: Two files state units of which one cannot be converted.
+    ConfigurationError if a file states another unit than the one given; InvalidDemonstrationsError
+    if two files state units of which one cannot be converted.
     """
     scale, stated = np.ones((len(recordings), len(names))), list[str | None]()
     remarks, doubts = [], []

@@ -22,11 +22,7 @@ frames. Ours: controllers run at 100 Hz and more."""
 
 
 def read_trajectory(path: Path, episode: str, message: Any, options: ReadOptions) -> Recording:
-    """One trajectory_msgs/JointTrajectory as an episode.
-
-    Raises:
-        FileFormatError: It lasts too long, or its times do not rise.
-    """
+    """One trajectory_msgs/JointTrajectory as an episode; FileFormatError if it lasts too long."""
     points, joints = message.points, tuple(message.joint_names)
     times = np.array([p.time_from_start.sec + p.time_from_start.nanosec * 1e-9 for p in points])
     positions = np.array([p.positions for p in points], dtype=float).reshape(len(times), -1)

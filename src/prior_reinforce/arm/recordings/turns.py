@@ -69,9 +69,7 @@ def aligned(
 
     The robot's joints keep to its limits, where they are known, and the recordings to the turns and
     signs of demonstrations that were there `before`, which stay as they are.
-
-    Raises:
-        InvalidDemonstrationsError: It cannot be told which way round a joint went.
+    InvalidDemonstrationsError if it cannot be told which way round a joint went.
     """
     shown = () if before is None else before.plans
     episodes = [*so_far(len(shown)), *selection.episodes]

@@ -105,11 +105,7 @@ def split_unit(
 
 
 def conversion(recorded: str, wanted: str, name: str) -> float:
-    """Return the factor from one unit to another.
-
-    Raises:
-        ConfigurationError: One cannot be converted to the other.
-    """
+    """Return the factor from one unit to another; ConfigurationError if there is none."""
     scale = factor(recorded, wanted)
     if scale is None:
         raise ConfigurationError(
