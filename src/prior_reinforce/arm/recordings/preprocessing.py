@@ -13,8 +13,12 @@ import numpy as np
 from jaxtyping import Float
 from msgspec import Meta
 
-from prior_reinforce.arm.recordings.failed_reads import failed_reads, held_frames, stalls
-from prior_reinforce.arm.recordings.leaps import refuse_leaps
+from prior_reinforce.arm.recordings.artefacts import (
+    failed_reads,
+    held_frames,
+    refuse_leaps,
+    stalls,
+)
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.time_finder import LONGEST
 from prior_reinforce.arm.recordings.units import say_names
@@ -195,10 +199,7 @@ def at_rests(recording: Recording, rest: float) -> list[Recording]:
 
 
 def copies(plans: Plans, names: Sequence[str]) -> str:
-    """Name two motions that are identical to the last bit, as no two recordings are; else "".
-
-    Either a file was copied, or one plan was executed twice and its outcomes differ by noise alone.
-    """
+    """Name two identical motions, as a copied file or a plan that ran twice has them; else ""."""
     first: dict[bytes, str] = {}
     for plan, name in zip(plans, names, strict=True):
         other = first.setdefault(plan.tobytes(), name)
