@@ -23,7 +23,6 @@ from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     EPISODE_COLUMNS,
     Episodes,
-    Recording,
     files_at,
     named_damage,
     natural_order,
@@ -94,28 +93,17 @@ def _episodes(path: Path, arrays: Arrays, name: str, options: ReadOptions) -> Ep
     names = next((texts[name] for name in ("joint_names", "names") if name in texts), ())
     wrong = len(keys) == 1 and len(set(names)) != (*motions.shape, 1)[2]
 
-    def episode_of(index: int) -> Recording:
-        outcome = None if outcomes is None else outcomes[index]
+    for index, episode in enumerate(episodes):
         own = {
             name: array[index] if several and array.shape[:1] == motions.shape[:1] else array
             for name, array in arrays.items()
             if array.dtype.kind in "biuf" and name not in _OUTCOME_KEYS
         }
+        said: dict[str, Any] = {"texts": texts, "stated": {**numbers, **own}}
+        said |= {"outcome": None if outcomes is None else outcomes[index]}
+        said |= {"names": names if wrong else ()}
         there = {name: array for name, array in own.items() if array.ndim > 0}
-        return recorded_among(
-            path,
-            episodes[index],
-            keys,
-            there,
-            options,
-            texts=texts,
-            stated={**numbers, **own},
-            names=names if wrong else (),
-            outcome=outcome,
-        )
-
-    for index, episode in enumerate(episodes):
-        yield episode, partial(episode_of, index)
+        yield episode, partial(recorded_among, path, episode, keys, there, options, **said)
 
 
 def _arrays(path: Path) -> Arrays:

@@ -12,6 +12,7 @@ import re
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ import numpy as np
 from prior_reinforce.arm.recordings.bounds import check_bytes, check_chunks, check_numbers
 from prior_reinforce.arm.recordings.naming import said_in
 from prior_reinforce.arm.recordings.options import ReadOptions
-from prior_reinforce.arm.recordings.recording import Episodes, Recording, named_damage
+from prior_reinforce.arm.recordings.recording import Episodes, named_damage
 from prior_reinforce.arm.recordings.stated import motion_keys, recorded_among, worth_reading
 from prior_reinforce.arm.recordings.time_finder import Stamps
 from prior_reinforce.errors import FileFormatError
@@ -76,16 +77,13 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             f"{source}: episodes end at {ends[:8].tolist()} but there are {count} frames; "
             "copy the store again"
         )
-    for number, (start, end) in enumerate(zip(starts.tolist(), ends.tolist(), strict=True)):
-
-        def one(episode: str = str(number), start: int = start, end: int = end) -> Recording:
-            own = {
-                name: array[start * len(array) // count : end * len(array) // count]
-                for name, array in numbers.items()
-            }
-            return recorded_among(source, episode, keys, own, options, texts=texts, stated=stated)
-
-        yield str(number), one
+    for i, (start, end) in enumerate(zip(starts.tolist(), ends.tolist(), strict=True)):
+        own = {
+            name: array[start * len(array) // count : end * len(array) // count]
+            for name, array in numbers.items()
+        }
+        said: dict[str, Any] = {"texts": texts, "stated": stated}
+        yield str(i), partial(recorded_among, source, str(i), keys, own, options, **said)
 
 
 def _numbers(source: Path, group: Any, arrays: Arrays, name: str) -> Stamps:
