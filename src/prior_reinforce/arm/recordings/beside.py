@@ -56,10 +56,7 @@ range at most; ours: tables of other things jump."""
 
 
 def moving_beside(recordings: Iterable[Recording]) -> dict[str, tuple[float, float]]:
-    """Return what moves beside the motion in any of the recordings, with its range in all.
-
-    A plan lacks it. Where a base stands comes last: it is many numbers, and long lists are cut.
-    """
+    """Return what moves beside the motion in any recording, with its range in all; a base last."""
     ends: dict[str, list[float]] = {}
     for recording in recordings:
         for low, high, name in recording.beside.values():
@@ -140,10 +137,7 @@ def twin_vectors(names: Sequence[str], values: Positions) -> Iterator[Ambiguity]
 
 
 def _is_series(name: str, moving: np.ndarray, others: Arrays) -> bool:
-    """Whether an array that is not as long as the motion was recorded at a rate of its own.
-
-    It has times of its own, or is long and changes as what moves does; matrices and tables do not.
-    """
+    """Whether an array of another length has its own rate: it has times, or changes as slowly."""
     for other, values in others.items():
         if other != name and values.shape == moving.shape[:1] and tells_time(other, values):
             return True

@@ -29,10 +29,7 @@ LONGEST_NAME = 200
 
 
 def check_numbers(path: Path, name: str, shape: Iterable[int], bytes_each: int = 8) -> None:
-    """Refuse an array, or a chunk of one, whose header claims too many numbers or bytes.
-
-    A number takes `bytes_each` bytes in the file.
-    """
+    """Refuse an array, or a chunk, whose header claims too many numbers, of `bytes_each` bytes."""
     sizes = tuple(int(size) for size in shape)
     numbers = math.prod(sizes)
     if numbers > MOST_NUMBERS or numbers * bytes_each > MOST_BYTES:

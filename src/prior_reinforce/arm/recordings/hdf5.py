@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import math
 import re
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -82,8 +81,11 @@ class _Field:
 
 def _demo(path: Path, top: Any, within: str, options: ReadOptions, episode: str) -> Recording:
     with named_damage(path, "HDF5"):
-        group = _own(path, top, within)
-        found = by_field(_arrays_in(path, group, options.key or _KEYS), _Field)
+        group, items = _own(path, top, within), dict[str, Any]()
+        group.visititems(lambda name, item: items.update({name: item}))
+        items |= {key: _own(path, group, key) for key in options.key or _KEYS}  # may be links
+        arrays = {n: a for n, a in items.items() if _is_own(a) and a.shape is not None}
+        found = by_field(arrays, _Field)
         keys = motion_keys(f"{path}: {group.name}", options, found, _KEYS)
         key, count = keys[0], found[keys[0]].shape[0]
         shapes = {name: own.shape for name, own in found.items() if own.dtype.kind in "biuf"}
@@ -145,14 +147,6 @@ def _is_own(found: Any) -> bool:
     import h5py
 
     return isinstance(found, h5py.Dataset) and not (found.external or found.is_virtual)
-
-
-def _arrays_in(path: Path, group: Any, keys: Sequence[str]) -> dict[str, Any]:
-    """The arrays in an episode by their path in it, and those that keys link to."""
-    items: dict[str, Any] = {}
-    group.visititems(lambda name, item: items.update({name: item}))
-    items |= {key: _own(path, group, key) for key in keys}
-    return {n: a for n, a in items.items() if _is_own(a) and a.shape is not None}
 
 
 def _numbers(path: Path, name: str, found: Any) -> Stamps:

@@ -251,20 +251,14 @@ class Recordings:
     ) -> tuple[Outcomes, tuple[Ambiguity, ...]]:
         """Find outcomes in their wanted units, and what is only guessed of these.
 
-        They are those given, a table beside the recordings, or the recordings' own.
-
-        Args:
-            wanted: Names and units of the components.
-            given: A table, or numbers by episode, which are in the wanted units.
-            unit: Of the table's columns that name none.
-            unclear: What else is to be said where there are no outcomes.
-            may_lack: Where there are none, return none instead of raising.
+        They are those `given` (a table, or numbers by episode in the wanted units), a table beside
+        the recordings, or the recordings' own. `unit` is of columns that name none, `unclear` what
+        else is to be said where there are none; with `may_lack`, none are returned then.
 
         Raises:
             ConfigurationError: The given outcomes are not numbers.
             InvalidDemonstrationsError: There are no outcomes, a component is missing, or a row is
-                of no episode of the source; or as in `in_units`.
-            UnclearUnitsError: The same, where something is unclear.
+                of no episode of the source (UnclearUnitsError, where something is unclear).
             FileFormatError: The table is missing or damaged.
         """
         others = [] if given is not None else csv.tables_of_outcomes(self.source, self.there)

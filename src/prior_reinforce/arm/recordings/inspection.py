@@ -323,10 +323,7 @@ def inspect(selection: Selection, wanted: Wanted) -> Inspection:
 
 
 def check_held(recordings: Sequence[Recording], robot: RobotLimits | None) -> None:
-    """Refuse recordings in which a joint that the robot holds still stands elsewhere, or moves.
-
-    InvalidDemonstrationsError, as the arm's reach and its box would be wrong.
-    """
+    """Refuse recordings in which a held joint stands elsewhere: InvalidDemonstrationsError."""
     held = {} if robot is None else robot.held
     joints = list(held)
     for i, (joint, at) in enumerate(held.items()):

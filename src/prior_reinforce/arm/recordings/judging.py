@@ -204,10 +204,7 @@ class Judge:
 
     @cached_property
     def _one_option(self) -> bool:
-        """Whether --units could give one unit for all, and contradicts no file.
-
-        Quaternions and matrices, which have none, are let alone.
-        """
+        """Whether --units could give one unit for all that have one, and contradicts no file."""
         pure = (Kind.QUATERNION, Kind.MATRIX)
         units = {one.unit for one in self.beliefs if one.stated or one.kind not in pure}
         return self.silent and len(units) == 1

@@ -61,10 +61,7 @@ def vectors(names: Sequence[str]) -> dict[str, list[int]]:
 
 
 def joint_vectors(names: Sequence[str], count: int) -> dict[str, list[int]]:
-    """Return the groups of `vectors` of this size that could be joint positions.
-
-    Groups named after velocities, torques, poses and the like could not.
-    """
+    """Return the groups of `vectors` of this size that no name calls velocities, torques, poses."""
     return {
         stem: group
         for stem, group in vectors(names).items()
@@ -97,10 +94,7 @@ def words(said: Any) -> tuple[str, ...]:
 
 
 def said_in(named: Mapping[str, Any]) -> tuple[dict[str, tuple[str, ...]], dict[str, float]]:
-    """Return the texts and the numbers in what a file says of itself, by their place in it.
-
-    JSON and dicts are searched, however deep: `meta.robot.joint_names`, `meta.fps`.
-    """
+    """Return the texts and numbers in what a file says of itself, by their place: `meta.fps`."""
     texts: dict[str, tuple[str, ...]] = {}
     numbers: dict[str, float] = {}
     for name, said in named.items():

@@ -176,10 +176,7 @@ def write_outcome_table(
 def keep_places(
     table: Path, places: Mapping[str, Place], form: OutcomeFormat, source: Path | None = None
 ) -> None:
-    """Write a table of places by episode, as `import` reads it, and the source of the episodes.
-
-    WorkspaceError if the disk is full, or the folder read-only.
-    """
+    """Write places by episode as `import` reads them, with their source; or WorkspaceError."""
     units, beside = form.units, () if source is None else (source.resolve(),)
     rows = {episode: (*map(repr, place), *beside) for episode, place in places.items()}
     heads = (*form.names, SD), (*units, units[0])

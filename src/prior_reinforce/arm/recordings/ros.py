@@ -174,10 +174,7 @@ def _files_of(bag: Path) -> list[Path]:
 
 
 def _refuse_other_messages(path: Path) -> None:
-    """Refuse an MCAP whose messages are not of ROS: JSON, for instance.
-
-    Its first record says so (mcap.dev/spec): the length of a text and the text, `ros2`.
-    """
+    """Refuse an MCAP whose first record does not say `ros1` or `ros2` (mcap.dev/spec)."""
     if has_suffix(path, (".mcap",)) and path.is_file():
         with path.open("rb") as file:
             magic, opcode, _, size = _HEAD.unpack(file.read(_HEAD.size).ljust(_HEAD.size))
@@ -285,10 +282,7 @@ def _states(
     notes: Sequence[str],
     elsewhere: Mapping[str, Beside],
 ) -> Recording:
-    """One episode of JointStates of one publisher.
-
-    Joints that other messages or topics hold are taken at the first ones' times.
-    """
+    """One publisher's JointStates, with the joints of other messages and topics at their times."""
     every = list(dict.fromkeys(joint for m in messages for joint in m.content.name))
     check_names(bag, every)
     if not any(every):
@@ -338,10 +332,7 @@ def _states(
 
 
 def _first_in_turn(messages: list[Message], wanted: Sequence[str]) -> list[Message]:
-    """The first of the messages that come in turn, each with its own joints; none if they do not.
-
-    Nothing is lost of them: each turn has one message of each.
-    """
+    """The first of messages that come in turn, each with its own joints; none if one is lost."""
     some = [m for m in messages if {*wanted} & {*m.content.name} and len(m.content.position)]
     said = [frozenset(m.content.name) for m in some]
     n = len({*said})

@@ -240,10 +240,7 @@ def names_said(
 
 
 def units_said(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
-    """Return the unit of each column as a file's texts state it; none if they state no unit.
-
-    A single one holds for all that can be in it.
-    """
+    """Return the unit of each column as texts state it; a single one for all that can be in it."""
     for key, own in texts.items():
         if "unit" not in key.lower() or says_time(key) or len(own) not in (1, len(names)):
             continue

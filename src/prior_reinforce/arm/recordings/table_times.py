@@ -67,10 +67,7 @@ def said_above(path: Path) -> dict[str, float]:
 
 
 def _declared(table: Table, said: dict[str, float], options: ReadOptions) -> dict[str, Any]:
-    """The rate that comments declare, as `clock_of` takes it.
-
-    ConfigurationError if another rate is given.
-    """
+    """The rate that comments declare, for `clock_of`; ConfigurationError if another is given."""
     found = declared_rate(table.where, said, options.rate)
     own, rate = found.get("own_rate"), options.rate
     if own and rate and abs(own - rate) > SAME_RATE * own:

@@ -173,11 +173,9 @@ def _read_csv(
     path: Path, delimiter: str | None, decimal: str | None, head: Collection[str]
 ) -> Table:
     check_bytes(path, path.stat().st_size)
-    with path.open("rb") as file:  # counted before they are split, which takes far more memory
-        check_table(
-            path, sum(block.count(b"\n") for block in iter(lambda: file.read(2**20), b"")), 1
-        )
-    kept = [(i, line) for i, line in enumerate(_decoded(path).splitlines(), 1) if line.strip()]
+    text = _decoded(path)
+    check_table(path, text.count("\n"), 1)  # before lines are split, which takes far more memory
+    kept = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip()]
     data = [(i, line) for i, line in kept if not line.lstrip().startswith(_COMMENTS)]
     if not data:
         return Table(str(path), (), False, (), (), ())
@@ -331,10 +329,7 @@ def _table(
     decimal: str = ".",
     title: Sequence[str] = (),
 ) -> Table:
-    """Names, units and cells of rows, with the numbers of their lines.
-
-    `title` are the cells of a comment right above: names, if there are as many as columns.
-    """
+    """Names, units and cells of numbered rows; names may be the `title`, in a comment above."""
     above = [any(cell.lower() in head for cell in row) for _, row in rows[:_SAMPLE]]
     rows = _of_one_width(where, rows[above.index(True) if any(above) else 0 :])
     first = rows[0][1]

@@ -208,10 +208,7 @@ def odd_starts(
     names: Sequence[str],
     units: Sequence[str],
 ) -> Iterator[str]:
-    """Say which takes start far from the others in a channel, as if they were of another arm.
-
-    Demonstrations that were there `before` count as one group.
-    """
+    """Say which takes start far from the others, as of another arm; those `before` are a group."""
     motions, n = [*before, *motions], len(before)
     episodes = [*so_far(n), *episodes]
     if len(motions) < 2:

@@ -127,10 +127,7 @@ def other_times(
 
 
 def _refuse_several(where: object, times: Sequence[tuple[str, Stamps]]) -> None:
-    """Refuse times of one name that differ: of each channel its own.
-
-    pandas numbers columns that come again, `Time.1`. Half a frame is no difference.
-    """
+    """Refuse times of one name, `Time.1` beside it, that differ by half a frame or more."""
     for (name, one), (again, other) in combinations(times, 2):
         bare, same = (re.sub(r"\.\d+$", "", each) for each in (name, again))
         if bare != same or one.shape != other.shape:

@@ -184,10 +184,7 @@ def _consecutive(
     taken: set[str],
     are: Callable[[Sequence[np.ndarray], set[str]], bool],
 ) -> list[tuple[str, ...]]:
-    """Channels side by side whose numbers, and units, say that they are one attitude.
-
-    For instance `pose_3` to `pose_6`. None is of two, or of those already taken.
-    """
+    """Channels side by side, `pose_3` to `pose_6`, that `are` one attitude; none `taken` before."""
     found, taken = [], {*taken}
     for first in range(len(form.names) - size + 1):
         columns = slice(first, first + size)

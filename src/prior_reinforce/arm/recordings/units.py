@@ -148,10 +148,8 @@ def say_names(names: Sequence[str]) -> str:
 
 
 def _follows(before: str, name: str) -> bool:
-    """Whether the names differ in one number only, which is one higher in the second."""
-    one, two = re.split(r"(\d+)", before), re.split(r"(\d+)", name)
-    differ = [(a, b) for a, b in zip(one, two, strict=False) if a != b]
-    if len(one) != len(two) or len(differ) != 1:
-        return False
-    ((a, b),) = differ
-    return a.isdigit() and b.isdigit() and int(b) == int(a) + 1
+    """Whether a name is the one before with one number one higher."""
+    return any(
+        name == f"{before[: n.start()]}{int(n[0]) + 1:0{len(n[0])}}{before[n.end() :]}"
+        for n in re.finditer(r"\d+", before)
+    )
