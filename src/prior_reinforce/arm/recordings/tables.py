@@ -13,7 +13,6 @@ import re
 from collections import Counter
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime, timedelta
 from functools import cached_property
 from itertools import product
 from pathlib import Path
@@ -292,15 +291,13 @@ def _moment(text: str) -> int | None:
     """A date as a number of [ns], in UTC unless it says otherwise; None if it is none."""
     if (found := _MOMENT.fullmatch(text)) is None:
         return None
-    year, month, day, hour, minute, second = (int(part or 0) for part in found.groups()[:6])
-    fraction, zone, more = found.groups()[6:]
+    year, month, day, *time, fraction, zone, more = (part or "00" for part in found.groups())
     try:
-        moment = datetime(year, month, day, hour, minute, second)
+        moment = np.datetime64(f"{year}-{month}-{day}T{':'.join(time)}.{fraction}", "ns")
     except ValueError:  # the 31st of February
         return None
-    hours = timedelta(hours=int(zone or 0), minutes=int(f"{(zone or '+')[0]}{more or 0}"))
-    whole = (moment - datetime.min - hours) // timedelta(seconds=1)
-    return whole * 10**9 + int((fraction or "").ljust(9, "0"))
+    minutes = 60 * int(zone) + int(f"{zone[0]}{more}")
+    return int(moment.astype(np.int64)) - 60 * 10**9 * minutes
 
 
 def _span(text: str) -> int | None:
