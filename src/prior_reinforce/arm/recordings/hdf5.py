@@ -114,21 +114,17 @@ def _said(
         found = {name: (node.attrs.get_id, node.attrs) for name in node.attrs}
         if node != own and len(node) <= _MOST_BESIDE:
             found |= {name: (node.__getitem__, node) for name in node if _is_small(node, name)}
+        values = dict[str, np.ndarray]()
         for name, (kind, within) in found.items():
             # What h5py has no type for is no name.
             with contextlib.suppress(TypeError, ValueError, OSError):
-                if np.prod(kind(name).shape) > MOST_COLUMNS:
-                    continue
-                value = np.asarray(within[name])
-                if value.dtype.kind in "biuf":
-                    stated.setdefault(name, value)
-                    continue
-                of_text, numbers = said_in({name: value})
-                for place, text in of_text.items():
-                    if len(text) > 1 or node == own:
-                        texts.setdefault(place, text)
-                for place, number in numbers.items():
-                    stated.setdefault(place, np.asarray(number))
+                if np.prod(kind(name).shape) <= MOST_COLUMNS:
+                    values[name] = np.asarray(within[name])
+        numbers = {name: value for name, value in values.items() if value.dtype.kind in "biuf"}
+        said, more = said_in({n: value for n, value in values.items() if n not in numbers})
+        stated = numbers | {n: np.asarray(number) for n, number in more.items()} | stated
+        own_texts = {n: text for n, text in said.items() if len(text) > 1 or node == own}
+        texts |= {n: text for n, text in own_texts.items() if n not in texts}
     return texts, stated
 
 

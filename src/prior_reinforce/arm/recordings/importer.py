@@ -413,19 +413,18 @@ def detect_format(source: Path) -> str:
     found = [name for name in found if FORMATS[name].whole] or found
     if not found and has_files(source, csv.IN_TEXT):
         return "csv"
-    if len(found) != 1:
-        for folder in sorted(source.iterdir()) if source.is_dir() and not found else ():
-            within = [name for name in FORMATS if FORMATS[name].recognises(folder)]
-            if folder.is_dir() and within:
-                several = sum(path.is_dir() for path in source.iterdir()) > 1
-                join = ", or put the files of all into one folder, named as theirs" * several
-                raise FileFormatError(
-                    f"{source} itself holds no recordings; name {folder}, which looks like "
-                    f"{' or '.join(within)}{join}"
-                )
-        if not found:
-            raise FileFormatError(f"{source} holds nothing that can be read; {_how_to_save()}")
+    if len(found) == 1:
+        return found[0]
+    if found:
         raise FileFormatError(
             f"{source} looks like {' and '.join(found)}: say which with --format, or name one file"
         )
-    return found[0]
+    folders = [path for path in source.iterdir() if path.is_dir()] if source.is_dir() else []
+    for folder in sorted(folders):
+        if within := [name for name in FORMATS if FORMATS[name].recognises(folder)]:
+            join = ", or put the files of all into one folder, named as theirs" * (len(folders) > 1)
+            raise FileFormatError(
+                f"{source} itself holds no recordings; name {folder}, which looks like "
+                f"{' or '.join(within)}{join}"
+            )
+    raise FileFormatError(f"{source} holds nothing that can be read; {_how_to_save()}")
