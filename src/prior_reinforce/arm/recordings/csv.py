@@ -40,7 +40,6 @@ from prior_reinforce.arm.recordings.table_times import (
     clock_of_table,
     counts_rows,
     named_column,
-    said_above,
     time_columns,
     with_whole_dates,
 )
@@ -104,12 +103,12 @@ def read(source: Path, options: ReadOptions) -> Episodes:
                     "frames or more"
                 )
             column, names, guessed = _throws(table, path.stem, options, alone=len(paths) == 1)
-        rows, said = names.count(""), said_above(path)
+        rows = names.count("")
         of_none = f"{rows} rows left out, which are of no episode"
         remarks = (of_none,) * (0 < rows < len(names))
         for episode in sorted({*names} - {""} or {""}, key=natural_order):
             own = table.rows([i for i, name in enumerate(names) if name == episode])
-            how = episode, options, column, guessed, said, remarks
+            how = episode, options, column, guessed, remarks
             guarded = or_leave_out(path.stem, partial(_has_other_columns, path, paths, options))
             yield episode, guarded(partial(_episode, own, *how))
 
@@ -218,7 +217,6 @@ def _episode(
     options: ReadOptions,
     episode_column: int | None,
     guessed: tuple[Ambiguity, ...],
-    above: dict[str, float],
     said_of_all: tuple[str, ...],
 ) -> Recording:
     log = next((g for g in LOG_FORMATS if set(g.columns) <= set(table.names)), None)
@@ -228,7 +226,7 @@ def _episode(
     joints = options.joints if table.named else None
     found = None if joints is None else find_channels(joints, names)
     table, remark = _without_other_logs(table, found or ())
-    times = time_columns(table, options, above, [episode_column, *(found or ())])
+    times = time_columns(table, options, [episode_column, *(found or ())])
     aside = {*times.columns, *times.held, episode_column, *told}
     others = [i for i in range(len(names)) if i not in aside]
     channels, named = list(others), table.named
@@ -240,7 +238,7 @@ def _episode(
     remarks = [*said_of_all, *remark]
     if log is not None:
         remarks.append(f"{log.name}: time in {log.time_unit}, motion is {log.key} (measured)")
-    clock = clock_of_table(table, episode, times, options, above, log and log.time_unit)
+    clock = clock_of_table(table, episode, times, options, log and log.time_unit)
     _refuse_second_log(table, clock.times if times.columns else np.zeros(len(table)))
     counts = [i for i in others if table.is_number(i) and counts_rows(table, i, clock.times)]
     plain = channels == others and table.named and not options.joints

@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from itertools import islice, product
-from pathlib import Path
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -40,8 +39,6 @@ _TIMES = (
     "datetime", "date", "zeit", "uhrzeit", "hora", "heure", "ora",
 )  # fmt: skip
 _DATES = ("date", "datum", "day", "fecha", "data")
-_MOST_COMMENTS = 200
-"""Lines above a table that are looked through. Ours."""
 _SAYS = re.compile(
     r"([A-Za-z][A-Za-z_ ]*?)\s*[:=]\s*(\d+\.?\d*(?:[eE][-+]?\d+)?)(?![\d.:-]|,\d)\s*([A-Za-zµ]*)"
 )
@@ -51,23 +48,15 @@ _THOUSAND = re.compile(r"\d{1,3}([.,]\d{3})+")
 """`1.000` beside a decimal comma."""
 
 
-def said_above(path: Path) -> dict[str, float]:
-    """Numbers by name in the comments above a table, `# fps: 40`; `dt_ms` of `dt: 25 ms`."""
-    said: dict[str, float] = {}
-    with path.open(encoding="utf-8", errors="replace") as file:
-        for line in islice(file, _MOST_COMMENTS):
-            if line.strip() and not line.lstrip("\ufeff ").startswith(("#", "%", "//")):
-                break
-            for name, number, unit in _SAYS.findall(line):
-                of_time = known_unit(unit) in SECONDS
-                if of_time or unit.lower() in ("", "hz", "khz", "fps"):
-                    scale = 1000 if unit.lower() == "khz" else 1
-                    said[f"{name}_{unit}" if of_time else name] = float(number) * scale
-    return said
-
-
-def _declared(table: Table, said: dict[str, float], options: ReadOptions) -> dict[str, Any]:
+def _declared(table: Table, options: ReadOptions) -> dict[str, Any]:
     """The rate that comments declare, for `clock_of`; ConfigurationError if another is given."""
+    said: dict[str, float] = {}
+    for line in table.comments:
+        for name, number, unit in _SAYS.findall(line):
+            of_time = known_unit(unit) in SECONDS
+            if of_time or unit.lower() in ("", "hz", "khz", "fps"):
+                scale = 1000 if unit.lower() == "khz" else 1
+                said[f"{name}_{unit}" if of_time else name] = float(number) * scale
     found = declared_rate(table.where, said, options.rate)
     own, rate = found.get("own_rate"), options.rate
     if own and rate and abs(own - rate) > SAME_RATE * own:
@@ -115,9 +104,7 @@ def named_column(table: Table, name: str, option: str) -> int:
     )
 
 
-def time_columns(
-    table: Table, options: ReadOptions, above: dict[str, float], others: Sequence[int | None]
-) -> FoundTimes:
+def time_columns(table: Table, options: ReadOptions, others: Sequence[int | None]) -> FoundTimes:
     """The columns of times; whatever rises steadily, and is no joint, may be one."""
     called = called_times(table, options)
     if options.time_column is not None:
@@ -131,7 +118,7 @@ def time_columns(
     found = find_times(table.where, free, called)
     if found.columns:
         return found
-    rate = options.rate or _declared(table, above, options).get("own_rate")
+    rate = options.rate or _declared(table, options).get("own_rate")
     found = other_times(table.where, free, rate, in_arrays=False)
     return found if len(table.names) > 1 else FoundTimes()
 
@@ -169,7 +156,6 @@ def clock_of_table(
     episode: str,
     times: FoundTimes,
     options: ReadOptions,
-    above: dict[str, float],
     unit: str | None,
 ) -> Clock:
     """Return the times of an episode's rows; `unit` is that of a known log, or None.
@@ -177,7 +163,7 @@ def clock_of_table(
     FileFormatError where a column of times holds something else.
     """
     if not times.columns:
-        declared = _declared(table, above, options)
+        declared = _declared(table, options)
         if not (declared or options.rate):  # a line of means is no want of times
             _check_times(table, [i for i, n in enumerate(table.names) if says_time(n)])
         return options.clock(episode, len(table), **declared)
@@ -195,7 +181,7 @@ def clock_of_table(
         columns[time] = (f"{name} and {part_name}", stamps)
     # Where there are times, a comment may be of another rate, as that of control.
     frames = FRAME in (unit, options.time_unit)
-    declared = _declared(table, above, options) if frames else {}
+    declared = _declared(table, options) if frames else {}
     times = times._replace(held=tuple(i for i in times.held if table.is_number(i)), unit=unit)
     return clock_at(table.where, episode, len(table), times, columns, options, **declared)
 

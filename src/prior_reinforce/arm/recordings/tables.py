@@ -87,6 +87,8 @@ class Table:
     delimiter: str = ","
     heads: tuple[int, ...] = ()
     """Lines in which the line of names comes again."""
+    comments: tuple[str, ...] = ()
+    """Lines of comments above the first row."""
 
     def __len__(self) -> int:
         """Number of rows."""
@@ -198,7 +200,8 @@ def _read_csv(
     again = tuple(i for i, line in kept if i > data[0][0] and line in above)
     if table.named and table.lines[:1] == (data[0][0],):  # its names are in that comment
         table = replace(table, heads=again)
-    return replace(table, delimiter=delimiter)
+    comments = tuple(line for i, line in kept if i < data[0][0])
+    return replace(table, delimiter=delimiter, comments=comments)
 
 
 def _decoded(path: Path) -> str:
