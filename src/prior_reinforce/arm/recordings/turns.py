@@ -90,7 +90,11 @@ def aligned(
     form = replace(form, attitudes=tuple(kept))
     if before is not None:
         form = replace(before.format, dt=1.0)
-    form, said = _align(form, episodes, motions, limits, angles=degrees, fixed=len(shown))
+    for size, are in ((4, _are_quaternions), (3, _start_at_two_forms)):
+        taken = {*form.periodic, *chain(*form.attitudes)}
+        unnamed = _consecutive(form, motions, size, taken, are)
+        form = replace(form, attitudes=(*form.attitudes, *unnamed))
+    said = list(_Together(form, episodes, motions, limits, len(shown)).align(degrees))
     new = motions[len(shown) :]
     if before is not None:
         _check_in_use(before, motions[: len(shown)], new, said)
@@ -123,52 +127,6 @@ def _check_in_use(
                 f"{name} of the new demonstrations starts {by:.3g} {unit} from where it did so "
                 "far, about a turn; import all together"
             )
-
-
-def _align(
-    form: PlanFormat,
-    episodes: Sequence[str],
-    motions: Sequence[np.ndarray],
-    limits: RobotLimits | None,
-    *,
-    angles: Collection[str] = (),
-    fixed: int = 0,
-) -> tuple[PlanFormat, list[str]]:
-    """Bring motions together in place; return their format with all attitudes, and what was done.
-
-    `angles` are channels that are known to be angles; the `fixed` first motions stay.
-    """
-    for size, are in ((4, _are_quaternions), (3, _start_at_two_forms)):
-        taken = {*form.periodic, *chain(*form.attitudes)}
-        unnamed = _consecutive(form, motions, size, taken, are)
-        form = replace(form, attitudes=(*form.attitudes, *unnamed))
-    attitudes = {*chain(*form.attitudes)}
-    joints = {name for name in form.names if np.isfinite(_range(name, limits)[0])}
-    named = [g for g in euler_angles(form.names, form.units) if (attitudes | joints).isdisjoint(g)]
-    euler = {*chain(*named)}
-    tools = {n for n, kind in zip(form.names, kinds(form.names), strict=True) if kind is Kind.TOOL}
-    flipping = _consecutive(form, motions, 3, attitudes | joints | euler | tools, _flip)
-    together = _Together(form, episodes, motions)
-    said = [what for group in form.attitudes for what in together.take_forms(group)]
-    for group in (*named, *flipping):
-        said += together.take_forms(group, TURN[form.units[form.names.index(group[0])]])
-    of_kind = zip(form.names, form.units, kinds(form.names), strict=True)
-    turning = {
-        i: name in {*angles, *euler, *joints} or kind is Kind.ANGLE or not _is_word(name)
-        for i, (name, unit, kind) in enumerate(of_kind)
-        if unit in TURN and name not in attitudes and kind is not Kind.TOOL
-    }
-    is_arm = len(turning) >= _JOINTS
-    upwards = is_arm and all(np.all(motion[:, [*turning]] >= 0) for motion in motions)
-    for i, known in turning.items():
-        said += together.take_turns(i, _range(form.names[i], limits), known=known, fixed=fixed)
-    starts = {i: min(motion[0, i] for motion in motions) for i in turning}
-    high = [i for i, start in starts.items() if start > TURN[form.units[i]] / 2]
-    if upwards and high:
-        each = ", ".join(f"{form.names[i]} {starts[i]:.3g} {form.units[i]}" for i in high)
-        what = f"{each} may be a turn too high for the arm's controller"
-        said.append(f"no joint goes below 0, as where angles count from 0 to 360 deg: {what}")
-    return form, said
 
 
 def _is_word(name: str) -> bool:
@@ -279,6 +237,41 @@ class _Together:
     form: PlanFormat
     episodes: Sequence[str]
     motions: Sequence[np.ndarray]
+    limits: RobotLimits | None
+    fixed: int
+    """How many motions, the first ones, are in use, and stay as they are."""
+
+    def align(self, angles: Collection[str]) -> Iterator[str]:
+        """Bring attitudes and angles together; `angles` are known to be, whatever their names."""
+        form = self.form
+        attitudes = {*chain(*form.attitudes)}
+        joints = {name for name in form.names if np.isfinite(_range(name, self.limits)[0])}
+        every = euler_angles(form.names, form.units)
+        named = [group for group in every if (attitudes | joints).isdisjoint(group)]
+        euler, of_kind = {*chain(*named)}, dict(zip(form.names, kinds(form.names), strict=True))
+        tools = {name for name, kind in of_kind.items() if kind is Kind.TOOL}
+        taken = attitudes | joints | euler | tools
+        for group in form.attitudes:
+            yield from self.take_forms(group)
+        for group in (*named, *_consecutive(form, self.motions, 3, taken, _flip)):
+            yield from self.take_forms(group, TURN[form.units[form.names.index(group[0])]])
+        turning = {
+            i: name in {*angles, *euler, *joints}
+            or of_kind[name] is Kind.ANGLE
+            or not _is_word(name)
+            for i, (name, unit) in enumerate(zip(form.names, form.units, strict=True))
+            if unit in TURN and name not in attitudes | tools
+        }
+        is_arm = len(turning) >= _JOINTS
+        upwards = is_arm and all(np.all(motion[:, [*turning]] >= 0) for motion in self.motions)
+        for i, known in turning.items():
+            yield from self.take_turns(i, known=known)
+        starts = {i: min(motion[0, i] for motion in self.motions) for i in turning}
+        high = [i for i, start in starts.items() if start > TURN[form.units[i]] / 2]
+        if upwards and high:
+            each = ", ".join(f"{form.names[i]} {starts[i]:.3g} {form.units[i]}" for i in high)
+            what = f"{each} may be a turn too high for the arm's controller"
+            yield f"no joint goes below 0, as where angles count from 0 to 360 deg: {what}"
 
     def take_forms(self, group: Sequence[str], turn: float = 0.0) -> Iterator[str]:
         """Take the form of an attitude that is nearest to the frame, and to the episode, before.
@@ -320,15 +313,13 @@ class _Together:
             if those:
                 yield f"{listed(those)}: {what} {says}"
 
-    def take_turns(
-        self, channel: int, limits: tuple[float, float], *, known: bool, fixed: int
-    ) -> Iterator[str]:
+    def take_turns(self, channel: int, *, known: bool) -> Iterator[str]:
         """Continue an angle across the end of its range, and start all episodes in one turn.
 
-        What is not `known` to be an angle is one where it passes the end of a range smoothly. It
-        keeps to its `limits`, and the `fixed` first motions stay.
+        What is not `known` to be an angle is one where it passes the end of a range smoothly.
         """
         name, unit = self.form.names[channel], self.form.units[channel]
+        limits = _range(name, self.limits)
         turn, own = TURN[unit], [motion[:, channel] for motion in self.motions]
         left = (_NEXT if known else _NOISE) * turn / TURN["rad"]
         passed = list[str]()
@@ -350,7 +341,7 @@ class _Together:
         elif not known:
             return
         spans = np.array([[values[0], values.min(), values.max()] for values in own])
-        shifts = _shifts(spans, turn, *limits, fixed)
+        shifts = _shifts(spans, turn, *limits, self.fixed)
         if shifts is None:
             raise InvalidDemonstrationsError(
                 f"{name} starts all round the circle, from {spans[:, 0].min():.3g} to "
