@@ -155,11 +155,6 @@ class Judge:
         most = max(each.largest for each in (self.places if one in self.places else [one]))
         return judge_unit(one.unit, most, opening=one.kind is Kind.TOOL)
 
-    def _doubt(self, one: Belief) -> Doubt | None:
-        """What makes a unit doubtful, by the first rule that applies; None if none does."""
-        rules = self._may_slide, self._is_no_angle, self._hardly_moves, self._is_beyond
-        return next(filter(None, (rule(one) for rule in rules)), None)
-
     def _may_slide(self, one: Belief) -> Doubt | None:
         """A rail or an external axis is not in degrees only for being among angles that are."""
         among = one in self.far
@@ -211,10 +206,11 @@ class Judge:
 
     @cached_property
     def _doubts(self) -> dict[Belief, Doubt]:
-        """Every doubt, and whether it is asked about: nobody stated the unit, or a wrong one."""
+        """Every doubt, by the first rule, asked about if nobody stated the unit, or a wrong one."""
+        rules = self._may_slide, self._is_no_angle, self._hardly_moves, self._is_beyond
         doubts = {}
         for one in self.beliefs:
-            if doubt := self._doubt(one):
+            if doubt := next(filter(None, (rule(one) for rule in rules)), None):
                 alike = self.far if one in self.far else [one]
                 possible = all(is_possible(one.unit, each.largest) for each in alike)
                 wrong = bool(self.given) and self._one_option and not possible
