@@ -22,6 +22,7 @@ from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.clock import NO_COLUMN
 from prior_reinforce.arm.recordings.naming import find_channels, numbered_like, vectors, words
 from prior_reinforce.arm.recordings.options import ReadOptions
+from prior_reinforce.arm.recordings.outcomes import rows_of
 from prior_reinforce.arm.recordings.recording import (
     EPISODE_COLUMNS,
     ROW_COLUMNS,
@@ -137,12 +138,9 @@ def _has_a_row_each(table: Table, episodes: Sequence[str]) -> bool:
     """Whether each row is of another episode, as in a table of outcomes."""
     if not 1 < len(table) <= len(episodes):  # a recording's cells are not looked through for it
         return False
-    lower = [name.lower() for name in table.names]
-    key = next((i for i, name in enumerate(lower) if name in ROW_COLUMNS), None)
-    if key is None and table.named and table.is_text(0):
-        called = {Path(cell).stem for cell in table.cells[0]}
-        key = 0 if called.intersection(episodes) else None
-    return key is not None and len(table) == len({*table.cells[key]})
+    key, rows = rows_of(table)
+    said = key is not None and table.names[key].lower() in ROW_COLUMNS
+    return len({*rows}) == len(table) and (said or not {*rows}.isdisjoint(episodes))
 
 
 def _throws(

@@ -184,6 +184,16 @@ def keep_places(
         write_outcome_table(table, rows, *heads, beside=SOURCE if beside else "note")
 
 
+def rows_of(table: Table) -> tuple[int | None, list[str]]:
+    """Return the column that names recordings, called so or the first of texts, and its names."""
+    bare = [split_unit(name, any_word=True)[0].lower() for name in table.names]
+    key = next((i for i, name in enumerate(bare) if name in ROW_COLUMNS), None)
+    if key is None and table.named and bare[0] not in _NOT_COMPONENTS and table.is_text(0):
+        key = 0
+    cells = [] if key is None else [from_cell(cell) for cell in table.cells[key]]
+    return key, [file[1] if (file := _FILE.fullmatch(cell)) else cell for cell in cells]
+
+
 def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
     """Read a table of outcomes, a CSV of any dialect; rows with empty cells are skipped.
 
@@ -199,9 +209,7 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
     wanted = {f"{name}_in": (name, "in") for name in names or ()}
     split = [wanted.get(name, (name, unit)) for name, unit in split]
     lower = [name.lower() for name, _ in split]
-    key = next((i for i, name in enumerate(lower) if name in ROW_COLUMNS), None)
-    if key is None and table.named and lower[0] not in _NOT_COMPONENTS and table.is_text(0):
-        key = 0  # by its cells, whatever it is called
+    key, rows = rows_of(table)
     other = (*_NOT_COMPONENTS, *ROW_COLUMNS)
     columns = [i for i, name in enumerate(lower) if i != key and name not in other]
     meant = columns_of(names or (), [split[i][0] for i in columns])
@@ -234,9 +242,8 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
     _doubt_thousands(table, dict(zip(columns, units, strict=True)))
     scale = [base_of(unit)[1] if unit else 1.0 for unit in units]
     sd, source = (lower.index(name) if name in lower else None for name in (SD, SOURCE))
-    table = table.rows([r for r in range(len(table)) if any(table.cells[i][r] for i in columns)])
-    files = [(_FILE.fullmatch(from_cell(cell)), from_cell(cell)) for cell in table.cells[key]]
-    rows = [file[1] if file else cell for file, cell in files]
+    filled = [r for r in range(len(table)) if any(table.cells[i][r] for i in columns)]
+    table, rows = table.rows(filled), [rows[r] for r in filled]
     for row, name in enumerate(rows):
         if name in rows[:row]:
             line = table.lines[row]
