@@ -137,7 +137,7 @@ def _search(place: str, said: Any, depth: int = _DEEPEST) -> Iterator[tuple[str,
 
 def _numbered(said: Mapping[Any, Any]) -> list[str]:
     """Names that have their own number from 0 each, as `{"elbow": 0, "pan": 1}`; none of others."""
-    at = {str(number): str(name) for name, number in said.items()}
+    at = {str(n): str(name) for name, n in said.items() if isinstance(n, (int, str))}
     numbers = list(map(str, range(len(said))))
     return [at[number] for number in numbers] if sorted(at) == sorted(numbers) else []
 
