@@ -55,7 +55,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         info = json.loads(info_path.read_text(encoding="utf-8"))
         features = dict(info["features"])
         rate = float(info["fps"])
-        widths = {n: w for n, w in _widths(features).items() if w > 0}
+        widths = _widths(features)
         vectors = [
             n for n, w in widths.items() if w > 1 and features[n]["dtype"].startswith("float")
         ]
@@ -69,7 +69,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             )
         key = keys[0]
         if not options.key:
-            _point_to_joints(source, key, features, widths, options.joints or ())
+            _point_to_joints(source, key, features, options.joints or ())
         widths = {n: w for n, w in widths.items() if n not in _OWN}
         beside = [
             n for n, w in widths.items() if n not in keys and (may_move(n, w) or says_time(n))
@@ -105,14 +105,10 @@ def read(source: Path, options: ReadOptions) -> Episodes:
 
 
 def _point_to_joints(
-    source: Path,
-    key: str,
-    features: dict[str, Any],
-    widths: dict[str, int],
-    joints: tuple[str, ...],
+    source: Path, key: str, features: dict[str, Any], joints: tuple[str, ...]
 ) -> None:
     """Raise FileFormatError naming the features of the joints, where the usual one has a place."""
-    own = _names(features[key])
+    own, widths = _names(features[key]), _widths(features)
     missing = missing_channels(joints, own) if len(own) == widths[key] else []
     if not missing or Kind.PLACE not in kinds(own):
         return
@@ -168,6 +164,7 @@ def _widths(features: dict[str, Any]) -> dict[str, int]:
         and str(feature.get("dtype", "")).startswith(("float", "int", "uint", "bool"))
         and isinstance(feature.get("shape"), list)
         and len(feature["shape"]) == 1
+        and int(feature["shape"][0]) > 0
     }
 
 

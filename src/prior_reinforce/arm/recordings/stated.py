@@ -140,7 +140,7 @@ def recorded_among(
         {n: a[:kept] if np.shape(a)[:1] == (count,) else a for n, a in each.items()}
         for each in (arrays, stated)
     )
-    positions, known = joined(where, keys, arrays, texts, options.joints)
+    positions, known = _joined(where, keys, arrays, texts, options.joints)
     bare, units = without_units(names or known)
     if not bare and len(positions) > 1:
         refuse_exchanged(episode, positions)
@@ -171,12 +171,8 @@ def _other_names(
             return
 
 
-def joined(
-    where: Path,
-    keys: Sequence[str],
-    arrays: Arrays,
-    texts: Texts,
-    joints: Sequence[str] | None = None,
+def _joined(
+    where: Path, keys: Sequence[str], arrays: Arrays, texts: Texts, joints: Sequence[str] | None
 ) -> tuple[Positions, tuple[str, ...]]:
     """Put arrays (T,) and (T, D) of the same frames side by side, with the names of the columns.
 

@@ -152,11 +152,7 @@ def counts_rows(table: Table, column: int, times: Times) -> bool:
 
 
 def clock_of_table(
-    table: Table,
-    episode: str,
-    times: FoundTimes,
-    options: ReadOptions,
-    unit: str | None,
+    table: Table, episode: str, times: FoundTimes, options: ReadOptions, unit: str | None
 ) -> Clock:
     """Return the times of an episode's rows; `unit` is that of a known log, or None.
 
