@@ -29,7 +29,7 @@ LONGEST_NAME = 200
 
 
 def check_numbers(path: Path, name: str, shape: Iterable[int], bytes_each: int = 8) -> None:
-    """Refuse an array, or a chunk, whose header claims too many numbers, of `bytes_each` bytes."""
+    """Refuse an array, or a chunk, whose header claims too much; `bytes_each` are of a number."""
     sizes = tuple(int(size) for size in shape)
     numbers = math.prod(sizes)
     if numbers > MOST_NUMBERS or numbers * bytes_each > MOST_BYTES:

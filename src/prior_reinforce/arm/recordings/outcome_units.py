@@ -119,7 +119,7 @@ def in_units(
 
 
 def _refuse_one_unit(outcomes: Outcomes, wanted: Sequence[str], unclear: Sequence[str]) -> None:
-    """Refuse components that look like several units, which no option can give: write the head."""
+    """Refuse components that look like several units, of which no option gives each its own."""
     far = np.nanmax(np.abs(outcomes.values), axis=0, initial=0.0)
     looks = [judge_unit(unit, most) or unit for unit, most in zip(wanted, far, strict=True)]
     unsaid = [j for j, unit in enumerate(outcomes.units) if unit is None]

@@ -208,7 +208,7 @@ def odd_starts(
     names: Sequence[str],
     units: Sequence[str],
 ) -> Iterator[str]:
-    """Say which takes start far from the others, as of another arm; those `before` are a group."""
+    """Say which takes start far from the others, as of another arm; `before` is one group."""
     motions, n = [*before, *motions], len(before)
     episodes = [*so_far(n), *episodes]
     if len(motions) < 2:
