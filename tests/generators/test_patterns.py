@@ -72,3 +72,15 @@ def test_what_does_not_move_is_one_pattern():
         np.ones((6, 20, 2)), OUTCOMES, PlanFormat(("a", "b"), ("rad",) * 2, 0.02)
     )
     assert patterns(still) == (tuple(range(6)),)
+
+
+def test_of_three_components_no_three_demonstrations_are_a_pattern_of_their_own():
+    """Where each is told by two others, it is by chance that halves tell more than all do."""
+    outcomes = np.random.default_rng(11).uniform([1.0, -0.2, 0.6], [1.5, 0.2, 0.8], (6, 3))
+    s = np.linspace(0, 1, 80)
+    swing, there_and_back = 10 * s**3 - 15 * s**4 + 6 * s**5, np.sin(np.pi * s) ** 2
+    manner = 3.0 * (-1.0) ** np.arange(6)[:, None] * there_and_back
+    x, y, z = outcomes.T[:, :, None]
+    plans = np.stack([x * swing, y * swing, z * there_and_back, manner], axis=-1)
+    form = PlanFormat(("x", "y", "z", "pitch"), ("m", "m", "m", "rad"), 0.02)
+    assert patterns(Demonstrations(plans, outcomes, form)) == (tuple(range(6)),)

@@ -123,7 +123,9 @@ def _ways(
         labels = fcluster(linkage(vectors[members], "ward"), 2, "maxclust")
         halving = [members[labels == label] for label in (1, 2)]
         missed = sum(_left_out(motions[half], outcomes[half]) for half in halving)
-        if min(map(len, halving)) >= fewest and missed < apart:
+        # Fewer do not tell what any one affine law of the outcome leaves.
+        enough = max(fewest, outcomes.shape[1] + 1)
+        if min(map(len, halving)) >= enough and missed < apart:
             apart, halves = missed, halving
     if not apart < _TOLD_APART * _left_out(motions[members], outcomes[members]):
         return [members]
