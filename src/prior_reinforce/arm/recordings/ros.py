@@ -1,55 +1,41 @@
 """ROS 1 bags, ROS 2 sqlite bags and MCAP, read with rosbags (no ROS needed).
 
 A sensor_msgs/JointState topic gives one episode a bag; a trajectory_msgs/JointTrajectory topic one
-a message. Joints are matched by name in every message, because nothing fixes their order.
+a message, or one a bag if each message has a single point.
 """
 
 from __future__ import annotations
 
 import re
 import struct
-from collections import Counter
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from prior_reinforce.arm.recordings.beside import columns_beside, is_of_base, may_move
-from prior_reinforce.arm.recordings.bounds import check_names, check_numbers
-from prior_reinforce.arm.recordings.naming import find_channels
+from prior_reinforce.arm.recordings.bounds import check_numbers
+from prior_reinforce.arm.recordings.messages import Message, read_messages
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     Beside,
     Episodes,
-    Positions,
-    Recording,
     has_suffix,
     is_hidden,
     named_damage,
     natural_order,
-    recorded,
     unread,
 )
-from prior_reinforce.arm.recordings.time_finder import Times
 from prior_reinforce.arm.recordings.trajectories import read_trajectory
-from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.arm.robots.limits import says_no_position
-from prior_reinforce.errors import ConfigurationError, FileFormatError
+from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import require_inside
 
 _SUFFIXES = (".bag", ".mcap", ".db3")
 _BAG = "a ROS bag, complete once its recorder ended (else: mcap recover, or ros2 bag reindex)"
-_HEADER, _RECORDER = "header", "recorder"
-_JUMP, _DRIFT = 1e8, 0.05
-"""By how much the two clocks of a bag may part within a message, in [ns], and drift apart as a
-share. Ours: queues hold messages for some 10 ms."""
-_MOVES, _LEAP, _OFTEN = 0.02, 0.5, 0.05
-"""Range in [rad] or [m] that is a motion; part of it that is a leap; share of frames in which no
-joint leaps, but two publishers do in turn. Ours."""
 _STATE, _TRAJECTORY = "sensor_msgs/msg/JointState", "trajectory_msgs/msg/JointTrajectory"
 _OF_NO_JOINT = re.compile(
     r"(rcl_interfaces|rosgraph_msgs|diagnostic_msgs|tf2?_msgs|\w*geometry_msgs|nav_msgs|shape_msgs"
@@ -62,21 +48,6 @@ _MAGIC, _HEAD = b"\x89MCAP0\r\n", struct.Struct("<8sBQI")
 _TIME = re.compile(r"builtin_interfaces/msg/(Time|Duration)|std_msgs/msg/Header")
 _MOST_BYTES = 2_000
 """Bytes of a message of a lift's or gripper's position at most. Ours: others are pictures."""
-
-
-class Message(NamedTuple):
-    """A message of a topic."""
-
-    stamp: int
-    """When the recorder got it, in [ns]."""
-    publisher: int
-    """Number of its connection."""
-    content: Any
-
-    @property
-    def positions(self) -> dict[str, float]:
-        """Position by joint."""
-        return dict(zip(self.content.name, self.content.position, strict=True))
 
 
 def recognises(source: Path) -> bool:
@@ -119,7 +90,8 @@ def read(source: Path, options: ReadOptions) -> Episodes:
                 check_numbers(bag, "all topics", (reader.message_count,))
                 keys = options.key or (None,)
                 topics = [_topic(bag, reader, key, beside=i > 0) for i, key in enumerate(keys)]
-                messages, *beside = (_messages(reader, own) for own, _ in topics)
+                each = [_messages(reader, own) for own, _ in topics]
+                messages, *beside = each
                 (connections, kind), *_ = topics
                 taken = {own[0].topic for own, _ in topics}
                 rest = {c.topic: c for c in reader.connections if c.topic not in taken}
@@ -137,7 +109,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             what = f"not read: topics {', '.join(sorted(unknown))}, whose messages the bag does not"
             notes.append(f"{what} describe; if one is a lift's or a gripper's, write it as CSV")
         for (own, _), said in zip(topics[1:], beside, strict=True):
-            if not any(m.content.name for m in said):
+            if not any(getattr(m.content, "name", ()) for m in said):
                 raise FileFormatError(
                     f"{bag}: topic {own[0].topic} ({own[0].msgtype}) has no numbers that could be "
                     "positions; drop that --key, or write them as CSV"
@@ -147,9 +119,11 @@ def read(source: Path, options: ReadOptions) -> Episodes:
                 f"{bag}: topic {connections[0].topic} has no messages; drop that bag, or leave it "
                 "out with --leave-out"
             )
-        if kind == _STATE:
-            there = (beside, notes, elsewhere)
-            yield name, partial(_states, bag, name, messages, options, *there)
+        if all(hasattr(m.content, "name") for m in messages):
+            if kind == _TRAJECTORY:
+                notes.append(f"{len(messages)} trajectories of one point each, read as one motion")
+            whole = partial(read_messages, bag, name, each, options, notes, elsewhere)
+            yield name, named_damage(bag, _BAG)(whole)
             continue
         for index, message in enumerate(messages):
             episode = name if len(messages) == 1 else f"{name}-{index}"
@@ -201,7 +175,8 @@ def _numbers(topic: str, message: Any) -> Any:
         for name, own in fields.items()
         for i in range(len(own))
     ]
-    return SimpleNamespace(name=names, position=np.concatenate([*fields.values(), []]))
+    position = np.concatenate([*fields.values(), []])
+    return SimpleNamespace(name=names, position=position, header=getattr(message, "header", None))
 
 
 def _fields(message: Any, path: str = "") -> Iterator[tuple[str, Any]]:
@@ -225,7 +200,7 @@ def _beside(topic: str, messages: Sequence[Message]) -> dict[str, Beside]:
     rows = [m.content.position for m in messages]
     if len(rows) < 2 or not names or len({len(row) for row in rows}) > 1:
         return {}
-    times = np.array([m.stamp - messages[0].stamp for m in messages]) * 1e-9
+    times = np.array([m.came - messages[0].came for m in messages]) * 1e-9
     found = columns_beside(names, np.array(rows), (), times)
     moving = {own.moving for own in found.values()} - {""}
     if is_of_base(topic):
@@ -236,7 +211,10 @@ def _beside(topic: str, messages: Sequence[Message]) -> dict[str, Beside]:
 
 
 def _messages(reader: Any, connections: Sequence[Any]) -> list[Message]:
-    """The messages of a topic; of one that no joint, lift or gripper sends, none."""
+    """The messages of a topic; of one that no joint, lift or gripper sends, none.
+
+    Trajectories of one point each are a stream of set points.
+    """
     found = []
     for c, stamp, raw in reader.messages(connections=connections):
         joints = c.msgtype in (_STATE, _TRAJECTORY)
@@ -245,7 +223,21 @@ def _messages(reader: Any, connections: Sequence[Any]) -> list[Message]:
             return []
         content = _numbers(c.topic, reader.deserialize(raw, c.msgtype))
         found.append(Message(stamp, c.id, content))
+    points = [getattr(m.content, "points", ()) for m in found]
+    if len(points) > 1 and all(len(own) == 1 for own in points):
+        found = [m._replace(content=_set_point(m.content)) for m in found]
     return found
+
+
+def _set_point(trajectory: Any) -> Any:
+    """A trajectory of one point as a message of joints, at the time by which it is reached."""
+    (point,) = trajectory.points
+    stamp, wait = trajectory.header.stamp, point.time_from_start
+    when = SimpleNamespace(sec=stamp.sec + wait.sec, nanosec=stamp.nanosec + wait.nanosec)
+    header = SimpleNamespace(stamp=when, frame_id=trajectory.header.frame_id)
+    return SimpleNamespace(
+        header=header, name=list(trajectory.joint_names), position=point.positions
+    )
 
 
 def _topic(bag: Path, reader: Any, key: str | None, *, beside: bool) -> tuple[list[Any], str]:
@@ -271,160 +263,3 @@ def _topic(bag: Path, reader: Any, key: str | None, *, beside: bool) -> tuple[li
 
 def _listed(kinds: Mapping[str, str]) -> str:
     return ", ".join(f"{topic} ({kind})" for topic, kind in sorted(kinds.items())) or "none"
-
-
-def _states(
-    bag: Path,
-    name: str,
-    messages: list[Message],
-    options: ReadOptions,
-    beside: Sequence[list[Message]],
-    notes: Sequence[str],
-    elsewhere: Mapping[str, Beside],
-) -> Recording:
-    """One publisher's JointStates, with the joints of other messages and topics at their times."""
-    every = list(dict.fromkeys(joint for m in messages for joint in m.content.name))
-    check_names(bag, every)
-    if not any(every):
-        raise FileFormatError(
-            f"{bag}: its messages name no joint, so nothing says which number is which; record "
-            "again with names (the driver's or the bridge's setting), or write the positions as CSV"
-        )
-    # Messages are matched by recorded names only.
-    found = None if options.joints is None else find_channels(options.joints, every)
-    wanted = options.joints if found is None else tuple(every[i] for i in found)
-    if wanted is None:
-        wanted = Counter(tuple(sorted(m.content.name)) for m in messages).most_common(1)[0][0]
-    kept = [m for m in messages if set(wanted) <= set(m.content.name)]
-    skipped = "without all joints skipped"
-    if not kept and (kept := _first_in_turn(messages, wanted)):
-        wanted = tuple(joint for joint in wanted if joint in kept[0].content.name)
-        skipped = "have the other joints, which are taken at the first ones' times"
-    if not kept:
-        raise FileFormatError(
-            f"{bag}: no message holds all of {list(wanted)}; joints in it are {say_names(every)}: "
-            "name those, or if messages hold some each, publish all in one (joint_state_publisher)"
-        )
-    kept, remarks = _of_one_publisher(bag, [m for m in kept if len(m.content.position)], wanted)
-    if len(kept) < len(messages):
-        remarks.append(f"{len(messages) - len(kept)} messages {skipped}")
-    remarks += notes
-    # Other channels of these messages, such as fingers, stay available by name.
-    names = tuple(n for n in kept[0].content.name if all(n in m.content.name for m in kept))
-    with named_damage(bag, _BAG):
-        positions = _positions(kept, names)
-        came = [m.stamp for m in kept]
-        others = [m for m in messages if not set(wanted) <= set(m.content.name)]
-        for of_topic in (others, *beside):
-            own = [m for m in of_topic if len(m.content.position)]
-            for joint in dict.fromkeys(n for m in own for n in m.content.name if n not in names):
-                at, values = zip(
-                    *((m.stamp, m.positions[joint]) for m in own if joint in m.positions),
-                    strict=True,
-                )
-                names = (*names, joint)
-                positions = np.column_stack([positions, np.interp(came, at, values)])
-    header = [m.content.header.stamp for m in kept]
-    sent = [stamp.sec * 10**9 + stamp.nanosec for stamp in header]
-    times, source, said = _clock_of(bag, sent, came, options.time_column)
-    clock = options.clock(name, len(kept), stamps=times, name=source, unit="ns")
-    return recorded(name, clock, positions, names, remarks=(*remarks, *said), beside=elsewhere)
-
-
-def _first_in_turn(messages: list[Message], wanted: Sequence[str]) -> list[Message]:
-    """The first of messages that come in turn, each with its own joints; none if one is lost."""
-    some = [m for m in messages if {*wanted} & {*m.content.name} and len(m.content.position)]
-    said = [frozenset(m.content.name) for m in some]
-    n = len({*said})
-    in_turn = len({*said[:n]}) == n and said[n:] == said[:-n]
-    return some[::n] if in_turn and {*wanted} <= frozenset().union(*said) else []
-
-
-def _of_one_publisher(
-    bag: Path, messages: list[Message], wanted: Sequence[str]
-) -> tuple[list[Message], list[str]]:
-    """The messages of the only publisher whose joints move, and what is said of others.
-
-    Publishers of one topic are told apart by connection (ROS 1), frame, and which joints they name.
-    FileFormatError if none has positions, or several move.
-    """
-    if not messages:
-        raise FileFormatError(
-            f"{bag}: its messages hold no positions (velocities or efforts alone); record the "
-            "topic that has positions, or say it with --key"
-        )
-    groups: dict[Hashable, list[Message]] = {}
-    for m in messages:
-        key = m.publisher, m.content.header.frame_id, frozenset(m.content.name)
-        groups.setdefault(key, []).append(m)
-    spans = [(own[0].stamp, own[-1].stamp) for own in groups.values()]
-    each = [messages]  # of one that came again, one after the other
-    if any(start <= end for (_, end), (start, _) in pairwise(sorted(spans))):
-        each = [
-            own for own in groups.values() if np.ptp(_positions(own, wanted), axis=0).max() > _MOVES
-        ]
-    if len(each) != 1 or _leaps(each[0], wanted):
-        counts = " and ".join(str(len(own)) for own in groups.values())
-        raise FileFormatError(
-            f"{bag}: its messages ({counts}) are of several publishers that disagree about the "
-            "same joints; record one of them alone (`ros2 topic info -v TOPIC` names them), or "
-            "write its positions as CSV"
-        )
-    rest = len(messages) - len(each[0])
-    return each[0], [f"{rest} messages of another publisher, whose joints hold still"] * (rest > 0)
-
-
-def _positions(messages: list[Message], joints: Sequence[str]) -> Positions:
-    rows = [[at[joint] for joint in joints] for at in (m.positions for m in messages)]
-    return np.array(rows, dtype=float)
-
-
-def _leaps(messages: list[Message], joints: Sequence[str]) -> bool:
-    """Whether a joint leaps time and again, as two publishers in turn make it do."""
-    q = _positions(messages, joints)
-    ranges = np.maximum(np.ptp(q, axis=0), _MOVES)
-    steps = np.diff(q, axis=0) / ranges
-    there, back = (np.mean(sign * steps > _LEAP, axis=0) for sign in (1, -1))
-    return bool(np.any(np.minimum(there, back) > _OFTEN))
-
-
-def _clock_of(
-    bag: Path, header: list[int], recorder: list[int], asked: str | None
-) -> tuple[Times, str, list[str]]:
-    """The times of messages: as they were stamped, unless that clock is unusable or jumps.
-
-    The recorder's clock holds them in a queue, and so is late and uneven; but where the header's
-    jumps and the recorder's does not, the header's was set meanwhile.
-    """
-    # Since the first stamp; since 1970, nanoseconds would be 256 ns coarse as floats.
-    sent, came = (
-        np.array([stamp - stamps[0] for stamp in stamps], dtype=np.float64)
-        for stamps in (header, recorder)
-    )
-    names = {_HEADER: (sent, "header stamps"), _RECORDER: (came, "the recorder's stamps")}
-    if asked not in (None, *names):
-        raise ConfigurationError(
-            f"--time-column {asked} is no clock of a bag; give {_HEADER} or {_RECORDER}"
-        )
-    if asked is not None:
-        return *names[asked], []
-    if header[0] <= 0 or np.any(np.diff(sent) < 0) or sent[-1] == 0:
-        why = "header stamps unusable, times are those of the recorder"
-        return *names[_RECORDER], [why]
-    period = float(np.median(np.diff(sent)))
-    apart = np.diff(sent - came)
-    frame = int(np.argmax(np.abs(apart)))
-    jump, rest = apart[frame], float(np.sum(apart) - apart[frame])
-    if abs(jump) > max(_JUMP, 3 * period) and abs(rest) < abs(jump) / 2:
-        if np.diff(came)[frame] <= 3 * max(period, float(np.median(np.diff(came)))):
-            why = (
-                f"header stamps jump by {jump * 1e-9:+.3f} s at {came[frame] * 1e-9:.2f} s, the "
-                "recorder's do not: times are those of the recorder"
-            )
-            return *names[_RECORDER], [why]
-    elif abs(sent[-1] - came[-1]) > max(_JUMP, _DRIFT * came[-1]) and came[-1] > 0:
-        raise FileFormatError(
-            f"{bag}: header stamps last {sent[-1] * 1e-9:.3g} s, the recorder's "
-            f"{came[-1] * 1e-9:.3g} s; say which are right: --time-column {_HEADER}, or {_RECORDER}"
-        )
-    return *names[_HEADER], []

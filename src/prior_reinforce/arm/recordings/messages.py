@@ -1,0 +1,304 @@
+"""One episode from the messages of a bag: whose they are, when they were sent, and which joints.
+
+Each joint is a series of its own, because joints may come in several messages or topics, in any
+order.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Hashable, Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from prior_reinforce.arm.recordings.bounds import check_names
+from prior_reinforce.arm.recordings.naming import find_channels, missing_channels
+from prior_reinforce.arm.recordings.options import ReadOptions
+from prior_reinforce.arm.recordings.recording import Beside, Positions, Recording, recorded
+from prior_reinforce.arm.recordings.time_finder import Times
+from prior_reinforce.arm.recordings.units import say_names
+from prior_reinforce.errors import ConfigurationError, FileFormatError
+
+_CLOCKS = {"header": "header stamps", "recorder": "the recorder's stamps"}
+_HEADER, _RECORDER = _CLOCKS
+_JUMP, _DRIFT = 1e8, 0.05
+"""By how much the two clocks of a bag may part within a message, in [ns], and drift apart as a
+share. Ours: queues hold messages for some 10 ms."""
+_LATE = 1e9
+"""By how much longer a joint's messages may be on their way than others, in [ns]. Ours."""
+_MOVES, _LEAP, _OFTEN = 0.02, 0.5, 0.05
+"""Range in [rad] or [m] that is a motion; part of it that is a leap; share of frames in which no
+joint leaps, but two publishers do in turn. Ours."""
+_DETOUR = 0.01
+"""Part of their ranges that joints go further, at least, when sorted by a clock that was set back.
+Ours."""
+_ON_ITS_WAY, _SELDOM, _LOST = 0.05, 0.25, 2.5
+"""Part of its greatest speed at which a motion is on its way; part of its range that its fastest
+joint may go between two messages of another joint, an eighth of a smooth motion, where a straight
+line errs by 1 %; frames that may always lie between them. Ours."""
+
+
+class Message(NamedTuple):
+    """A message of a topic."""
+
+    came: int
+    """When the recorder got it, in [ns]."""
+    publisher: int
+    """Number of its connection."""
+    content: Any
+    """Its `name`, `position` and `header`, as in a sensor_msgs/JointState; the header may be
+    None."""
+
+    @property
+    def positions(self) -> dict[str, float]:
+        """Position by joint."""
+        return dict(zip(self.content.name, self.content.position, strict=True))
+
+    @property
+    def sent(self) -> int:
+        """When its sender stamped it, in [ns]; 0 if it did not."""
+        stamp = getattr(self.content.header, "stamp", None)
+        return 0 if stamp is None else stamp.sec * 10**9 + stamp.nanosec
+
+    def at(self, clock: str) -> int:
+        """Time by one of the two clocks, in [ns]."""
+        return self.sent if clock == _HEADER else self.came
+
+
+def read_messages(
+    bag: Path,
+    name: str,
+    topics: Sequence[list[Message]],
+    options: ReadOptions,
+    notes: Sequence[str],
+    elsewhere: Mapping[str, Beside],
+) -> Recording:
+    """Return one episode, whose frames are the messages that tell the most of the wanted joints.
+
+    Other joints are interpolated at their times, each from the first topic that names it; frames
+    before or after such a joint is told are left out. FileFormatError if it is told too seldom.
+    """
+    owner: dict[str, int] = {}
+    for topic, messages in enumerate(topics):
+        for joint in (joint for m in messages for joint in m.content.name):
+            owner.setdefault(joint, topic)
+    wanted = _wanted(bag, topics, owner, options.joints, notes)
+    told: dict[tuple[str, ...], list[Message]] = {}
+    for topic, messages in enumerate(topics):
+        for m in messages:
+            own = tuple(j for j in wanted if owner[j] == topic and j in m.content.name)
+            if own and len(m.content.position):
+                told.setdefault(own, []).append(m)
+    most = max(told, key=lambda own: len(own) * len(told[own]), default=())
+    kept, remarks = _of_one_publisher(bag, told.get(most, []), most)
+    kept, clock, said = _by_clock(bag, kept, most, options.time_column)
+    # Other channels of these messages, such as fingers, stay available by name.
+    names = tuple(n for n in kept[0].content.name if all(n in m.content.name for m in kept))
+    positions, motion = _positions(kept, names), _positions(kept, most)
+    inside = np.ones(len(kept), dtype=bool)
+    joined: dict[str, list[str]] = {}
+    for joint in (joint for joint in owner if joint not in names):
+        series = [m for m in topics[owner[joint]] if joint in m.content.name]
+        series = [m for m in series if len(m.content.position)]
+        by = clock if all(m.sent > 0 for m in series) else _RECORDER
+        if joint in wanted and series and by == _HEADER != options.time_column:
+            _refuse_late(bag, joint, series, kept)
+        times, at, values = _series(kept, series, joint, by)
+        gap, longest = _gap(at, times, motion)
+        if gap <= longest:
+            names = (*names, joint)
+            positions = np.column_stack([positions, np.interp(times, at, values)])
+        elif joint in wanted:
+            raise FileFormatError(
+                f"{bag}: nothing tells {joint} for {gap:.3g} s of a motion that is too fast for "
+                f"more than {longest:.3g} s of it; record {joint} more often, or leave it out of "
+                "--joints"
+            )
+        if joint in wanted:
+            inside &= (times >= at[0]) & (times <= at[-1])
+            joined.setdefault(by, []).append(joint)
+    for by, those in joined.items():
+        what = f"{say_names(those)} interpolated by {_CLOCKS[by]} at the times of "
+        outside = f"; {np.sum(~inside)} frames that not all span left out" * (not all(inside))
+        remarks.append(f"{what}{say_names(most)}{outside}")
+    if (skipped := len(topics[owner[most[0]]]) - len(kept)) and not joined:
+        remarks.append(f"{skipped} messages without all joints skipped")
+    # Since the first stamp; since 1970, nanoseconds would be 256 ns coarse as floats.
+    stamps = np.array([m.at(clock) - kept[0].at(clock) for m in kept], dtype=np.float64)[inside]
+    frames = options.clock(name, len(stamps), stamps=stamps, name=_CLOCKS[clock], unit="ns")
+    remarks += [*notes, *said]
+    return recorded(
+        name, frames, positions[inside], names, remarks=tuple(remarks), beside=elsewhere
+    )
+
+
+def _wanted(
+    bag: Path,
+    topics: Sequence[list[Message]],
+    owner: Mapping[str, int],
+    joints: Sequence[str] | None,
+    notes: Sequence[str],
+) -> tuple[str, ...]:
+    """Recorded names of the joints to read.
+
+    Without `joints` they are those that most messages of the first topic hold, and all of others.
+    """
+    every = list(owner)
+    check_names(bag, every)
+    if not any(every):
+        raise FileFormatError(
+            f"{bag}: its messages name no joint, so nothing says which number is which; record "
+            "again with names (the driver's or the bridge's setting), or write the positions as CSV"
+        )
+    if joints is None:
+        common = Counter(tuple(sorted(m.content.name)) for m in topics[0]).most_common(1)[0][0]
+        return (*common, *(joint for joint in every if owner[joint] > 0))
+    found = find_channels(joints, every)
+    if found is None:
+        missing = say_names(missing_channels(joints, every))
+        raise FileFormatError(
+            f"{bag}: no message holds {missing}; joints in it are {say_names(every)}: name those "
+            f"with --joints{''.join(f'; {note}' for note in notes)}"
+        )
+    return tuple(every[i] for i in found)
+
+
+def _series(
+    frames: list[Message], messages: list[Message], joint: str, clock: str
+) -> tuple[Times, np.ndarray, np.ndarray]:
+    """Times of the frames, times at which a joint is told, and its values then."""
+    start = frames[0].at(clock)
+    times = np.array([m.at(clock) - start for m in frames]) * 1e-9
+    told = sorted((m.at(clock) - start, m.positions[joint]) for m in messages)
+    at, values = np.array([own for own in told if np.isfinite(own[1])]).reshape(-1, 2).T
+    return times, at * 1e-9, values
+
+
+def _gap(at: np.ndarray, times: Times, motion: Positions) -> tuple[float, float]:
+    """For how long of a motion a joint is not told, and for how long it may be, in [s]."""
+    if len(at) < 2 or len(times) < 2:
+        return np.inf, 0.0
+    period = float(np.median(np.diff(times)))
+    steps = np.nanmax(np.abs(_steps(motion)), axis=1, initial=0)
+    speeds = steps / np.maximum(np.diff(times), period)
+    way = np.flatnonzero(speeds > _ON_ITS_WAY * speeds.max())
+    if not len(way):
+        return 0.0, np.inf
+    start, end = times[way[0]], times[way[-1] + 1]
+    gap = np.diff([start, *at[(start < at) & (at < end)], end]).max()
+    return float(gap), max(_SELDOM / float(speeds.max()), _LOST * period)
+
+
+def _refuse_late(bag: Path, joint: str, messages: list[Message], frames: list[Message]) -> None:
+    """Refuse to join by header stamps of clocks that differ."""
+    own, other = (np.median([m.came - m.sent for m in each]) for each in (messages, frames))
+    if abs(own - other) > _LATE:
+        raise FileFormatError(
+            f"{bag}: by header stamps {joint} is on its way {(own - other) * 1e-9:.3g} s longer "
+            f"than other joints; say which stamps are right: --time-column {_HEADER}, or "
+            f"{_RECORDER}"
+        )
+
+
+def _of_one_publisher(
+    bag: Path, messages: list[Message], wanted: Sequence[str]
+) -> tuple[list[Message], list[str]]:
+    """The messages of the only publisher whose joints move, and what is said of others.
+
+    Publishers of one topic are told apart by connection (ROS 1), frame, and which joints they name.
+    FileFormatError if none has positions, or several move.
+    """
+    if not messages:
+        raise FileFormatError(
+            f"{bag}: its messages hold no positions (velocities or efforts alone); record the "
+            "topic that has positions, or say it with --key"
+        )
+    groups: dict[Hashable, list[Message]] = {}
+    for m in messages:
+        frame = getattr(m.content.header, "frame_id", "")
+        key = m.publisher, frame, frozenset(m.content.name)
+        groups.setdefault(key, []).append(m)
+    spans = [(own[0].came, own[-1].came) for own in groups.values()]
+    each = [messages]  # of one that came again, one after the other
+    if any(start <= end for (_, end), (start, _) in pairwise(sorted(spans))):
+        each = [
+            own for own in groups.values() if np.ptp(_positions(own, wanted), axis=0).max() > _MOVES
+        ]
+    if len(each) != 1 or _leaps(each[0], wanted):
+        counts = " and ".join(str(len(own)) for own in groups.values())
+        raise FileFormatError(
+            f"{bag}: its messages ({counts}) are of several publishers that disagree about the "
+            "same joints; record one of them alone (`ros2 topic info -v TOPIC` names them), or "
+            "write its positions as CSV"
+        )
+    rest = len(messages) - len(each[0])
+    return each[0], [f"{rest} messages of another publisher, whose joints hold still"] * (rest > 0)
+
+
+def _positions(messages: list[Message], joints: Sequence[str]) -> Positions:
+    rows = [[at[joint] for joint in joints] for at in (m.positions for m in messages)]
+    return np.array(rows, dtype=float)
+
+
+def _steps(positions: Positions) -> np.ndarray:
+    """How far each joint goes from frame to frame, as a part of its range."""
+    return np.diff(positions, axis=0) / np.maximum(np.ptp(positions, axis=0), _MOVES)
+
+
+def _leaps(messages: list[Message], joints: Sequence[str]) -> bool:
+    """Whether a joint leaps time and again, as two publishers in turn make it do."""
+    steps = _steps(_positions(messages, joints))
+    there, back = (np.mean(sign * steps > _LEAP, axis=0) for sign in (1, -1))
+    return bool(np.any(np.minimum(there, back) > _OFTEN))
+
+
+def _by_clock(
+    bag: Path, messages: list[Message], joints: Sequence[str], asked: str | None
+) -> tuple[list[Message], str, list[str]]:
+    """The messages in order of a clock, which clock, and what is said of it.
+
+    It is the header's, unless that is unusable or jumps. The recorder's clock holds messages in a
+    queue, and so is late and uneven; but where the header's jumps and the recorder's does not, the
+    header's was set meanwhile.
+    """
+    if asked not in (None, *_CLOCKS):
+        raise ConfigurationError(
+            f"--time-column {asked} is no clock of a bag; give {_HEADER} or {_RECORDER}"
+        )
+    # Since the first stamp; since 1970, nanoseconds would be 256 ns coarse as floats.
+    sent, came = (
+        np.array([m.at(clock) - messages[0].at(clock) for m in messages], dtype=np.float64)
+        for clock in _CLOCKS
+    )
+    in_order = [messages[i] for i in np.argsort(sent, kind="stable")]
+    late = int(np.sum(sent < np.maximum.accumulate(sent)))
+    ways = [np.abs(_steps(_positions(each, joints))) for each in (in_order, messages)]
+    detour = float(np.nanmean(np.nansum(ways[0], axis=0) - np.nansum(ways[1], axis=0)))
+    is_set_back = late > 0 and (np.diff(sent).min() < -_JUMP or detour > _DETOUR)
+    if asked == _RECORDER or (asked == _HEADER and is_set_back):
+        return messages, asked, []
+    if asked is None and (min(m.sent for m in messages) <= 0 or is_set_back or np.ptp(sent) == 0):
+        return messages, _RECORDER, ["header stamps unusable, times are those of the recorder"]
+    said = [f"{late} messages came late, and are put in order by their header stamps"] * (late > 0)
+    if asked == _HEADER:
+        return in_order, _HEADER, said
+    period = float(np.median(np.diff(sent)))
+    apart = np.diff(sent - came)
+    frame = int(np.argmax(np.abs(apart)))
+    jump, rest = apart[frame], float(np.sum(apart) - apart[frame])
+    if abs(jump) > max(_JUMP, 3 * period) and abs(rest) < abs(jump) / 2:
+        if np.diff(came)[frame] <= 3 * max(period, float(np.median(np.diff(came)))):
+            why = (
+                f"header stamps jump by {jump * 1e-9:+.3f} s at {came[frame] * 1e-9:.2f} s, the "
+                "recorder's do not: times are those of the recorder"
+            )
+            return messages, _RECORDER, [why]
+    elif abs(sent[-1] - came[-1]) > max(_JUMP, _DRIFT * came[-1]) and came[-1] > 0:
+        raise FileFormatError(
+            f"{bag}: header stamps last {sent[-1] * 1e-9:.3g} s, the recorder's "
+            f"{came[-1] * 1e-9:.3g} s; say which are right: --time-column {_HEADER}, or {_RECORDER}"
+        )
+    return in_order, _HEADER, said

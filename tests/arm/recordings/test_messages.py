@@ -1,0 +1,142 @@
+"""Messages of joint positions: joined across topics and rates, in order of their stamps."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from prior_reinforce.arm.recordings.messages import Message, read_messages
+from prior_reinforce.arm.recordings.options import ReadOptions
+from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError
+
+ARM, GRIPPER = ("shoulder", "elbow"), ("gripper",)
+START = 1_700_000_000 * 10**9
+
+
+def motion(t):
+    """Of two joints and a gripper, in [rad] and [m]."""
+    s = np.clip((np.asarray(t) - 0.4) / 1.2, 0, 1)
+    s = 10 * s**3 - 15 * s**4 + 6 * s**5
+    return {"shoulder": 0.8 * s, "elbow": 1 - 0.5 * s, "gripper": 0.04 * np.sin(3 * t) ** 2}
+
+
+def told(joints, times, *, late=0.0, stamped=True, clock=0.0):
+    """A message at each time, received `late` and stamped by a clock that is `clock` ahead."""
+    q = motion(times)
+    messages = []
+    for i, t in enumerate(times):
+        stamp = START + round((t + np.broadcast_to(clock, len(times))[i]) * 1e9)
+        stamp = SimpleNamespace(sec=stamp // 10**9, nanosec=stamp % 10**9)
+        content = SimpleNamespace(
+            name=list(joints),
+            position=np.array([q[joint][i] for joint in joints]),
+            header=SimpleNamespace(stamp=stamp, frame_id="") if stamped else None,
+        )
+        came = START + round((t + np.broadcast_to(late, len(times))[i]) * 1e9)
+        messages.append(Message(came, 0, content))
+    return sorted(messages, key=lambda m: m.came)
+
+
+def at(rate, start=0.0, end=2.0):
+    return np.arange(start, end, 1 / rate)
+
+
+def read(*topics, joints=(*ARM, *GRIPPER), **options):
+    asked = ReadOptions(joints=joints, **options)
+    return read_messages(Path("bag"), "throw", topics, asked, [], {})
+
+
+def check(recording, tolerance=1e-3):
+    for joint, expected in motion(recording.times).items():
+        column = recording.positions[:, recording.names.index(joint)]
+        np.testing.assert_allclose(column, expected, atol=tolerance)
+
+
+@pytest.mark.parametrize("late", [0.0, 0.15])
+@pytest.mark.parametrize("same_topic", [True, False])
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_gripper_at_a_rate_of_its_own_is_read_by_header_stamps(late, same_topic, first):
+    topics = [told(ARM, at(100)), told(GRIPPER, at(30), late=late)]
+    if same_topic:
+        topics = [sorted((m for topic in topics for m in topic), key=lambda m: m.came)]
+    elif first:
+        topics = topics[::-1]
+    recording = read(*topics)
+    check(recording)
+    assert recording.period == pytest.approx(0.01)
+    assert recording.times[-1] == pytest.approx(at(30)[-1], abs=0.011)  # their common span
+    (remark,) = recording.remarks
+    assert "gripper" in remark
+    assert "header stamps" in remark
+
+
+def test_halves_of_an_arm_at_two_rates_are_put_together():
+    halves = [*told(ARM[:1], at(100)), *told((*ARM[1:], *GRIPPER), at(60))]
+    check(read(sorted(halves, key=lambda m: m.came)))
+
+
+def test_without_joints_every_joint_of_a_topic_beside_is_taken():
+    assert set(read(told(ARM, at(100)), told(GRIPPER, at(50)), joints=None).names) == {
+        *ARM,
+        *GRIPPER,
+    }
+
+
+def test_messages_without_stamps_are_joined_by_the_recorders_and_it_is_said():
+    recording = read(told(ARM, at(100)), told(GRIPPER, at(50), stamped=False))
+    check(recording)
+    assert "recorder's stamps" in recording.remarks[0]
+    assert recording.clock == "header stamps in ns"
+
+
+@pytest.mark.parametrize(
+    "times", [at(4), at(100, end=0.8), at(100, start=1.2), [0.5], [*at(50, end=0.8), *at(50, 1.2)]]
+)
+def test_a_joint_that_is_told_too_seldom_is_refused_by_name(times):
+    gripper = told(GRIPPER, np.array(times))
+    with pytest.raises(FileFormatError, match=r"gripper .*record .* more often, .*--joints"):
+        read(told(ARM, at(100)), gripper)
+    assert read(told(ARM, at(100)), gripper, joints=ARM).names == ARM
+
+
+def test_a_joint_without_positions_is_refused_by_name():
+    empty = told(GRIPPER, at(50))
+    for m in empty:
+        m.content.position = np.zeros(0)
+    with pytest.raises(FileFormatError, match="record gripper more often"):
+        read(told(ARM, at(100)), empty)
+
+
+def test_header_stamps_of_clocks_that_differ_are_asked_about():
+    topics = told(ARM, at(100)), told(GRIPPER, at(50), clock=30.0)
+    with pytest.raises(FileFormatError, match=r"gripper .*--time-column header, or recorder"):
+        read(*topics)
+    check(read(*topics, time_column="recorder"))
+
+
+def test_a_joint_that_no_topic_holds_is_named_beside_those_there():
+    with pytest.raises(FileFormatError, match=r"holds gripper; .* shoulder, elbow: name those"):
+        read(told(ARM, at(100)))
+
+
+@pytest.mark.parametrize("swapped", [[0], [90], [198], [*range(3, 198, 2)]])
+def test_messages_that_came_out_of_order_are_sorted_by_their_stamps(swapped):
+    t = at(100)
+    late = np.zeros(len(t))
+    late[swapped] = 0.0109
+    recording = read(told((*ARM, *GRIPPER), t, late=late))
+    np.testing.assert_allclose(recording.times, t, atol=1e-9)
+    check(recording, 1e-9)
+    assert f"{len(swapped)} messages came late" in recording.remarks[0]
+
+
+@pytest.mark.parametrize("back", [0.035, 0.5])
+def test_a_clock_that_was_set_back_is_no_message_out_of_order(back):
+    t = at(100)
+    messages = told((*ARM, *GRIPPER), t, clock=np.where(t < 1.0, 0.0, -back))
+    recording = read(messages)
+    np.testing.assert_allclose(recording.times, t, atol=1e-9)
+    assert "those of the recorder" in recording.remarks[0]
+    with pytest.raises(InvalidDemonstrationsError, match="time does not increase"):
+        read(messages, time_column="header")
