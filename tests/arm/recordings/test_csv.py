@@ -612,3 +612,13 @@ def test_what_is_wrong_in_every_file_leaves_none_out(tmp_path):
     (tmp_path / "throw_1.csv").write_text("\n".join(["t,elbow,wrist", *rows]))
     with pytest.raises(InvalidDemonstrationsError, match=r"--leave-out throw_0$"):
         read_recordings(tmp_path, joints=["elbow"])
+
+
+def test_numbers_of_episodes_that_begin_anew_with_a_session_are_refused(tmp_path):
+    rows = [
+        f"{k / 10},{s},{n},{np.sin(k / 4 + n)}" for s in (1, 2) for n in (1, 2) for k in range(20)
+    ]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["t,session,trial,joint1", *rows]))
+    with pytest.raises(FileFormatError, match=r"trial counts anew with session.*--episode-column"):
+        read_recordings(path)

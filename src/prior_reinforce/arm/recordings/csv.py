@@ -159,12 +159,13 @@ def _throws(
     if options.episode_column is not None:
         column = named_column(table, options.episode_column, "--episode-column")
     if column is not None:
+        _refuse_labels_again(table, column)
         return column, table.cells[column], ()
     if not (alone and table.named):
         return None, whole, ()
     starts = _starts(table, options)
     for i, cells in enumerate(table.cells):
-        changes = [k for k in range(len(cells)) if k == 0 or cells[k] != cells[k - 1]]
+        changes = _changes(cells)
         says = [cells[k] for k in changes]
         if len(set(says)) < len(says) or len(says) < 2:
             continue
@@ -183,6 +184,26 @@ def _throws(
         return None, whole, ()
     numbers = np.searchsorted(starts, np.arange(len(table)), side="right") - 1
     return None, [f"{stem}-{number}" for number in numbers], ()
+
+
+def _changes(cells: Sequence[str]) -> list[int]:
+    """Rows in which a column says something else than in the row before, with the first."""
+    return [k for k in range(len(cells)) if k == 0 or cells[k] != cells[k - 1]]
+
+
+def _refuse_labels_again(table: Table, column: int) -> None:
+    """FileFormatError if labels of episodes come again where another column changes: a session."""
+    own, changes = table.cells[column], _changes(table.cells[column])
+    if len({*own}) == len(changes):
+        return
+    for name, cells in zip(table.names, table.cells, strict=True):
+        labels = {*zip(cells, own, strict=True)}
+        if {*_changes(cells)} < {*changes} and len(labels) == len(changes):
+            raise FileFormatError(
+                f"{table.where}: {table.names[column]} counts anew with {name}, so that several "
+                f"throws have one label: write both in one column, such as {name}_"
+                f"{table.names[column]}, and name it, --episode-column"
+            )
 
 
 def _starts(table: Table, options: ReadOptions) -> list[int]:
