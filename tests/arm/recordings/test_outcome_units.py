@@ -250,3 +250,31 @@ def test_a_row_near_the_base_is_in_no_other_unit(tmp_path, head, rows, unit):
 def test_angles_and_times_may_be_small(tmp_path):
     path = table(tmp_path, "episode,a_deg,t_ms\n0,40,800\n1,50,900\n2,0.8,0.9\n3,55,950\n")
     assert len(in_units(read_outcomes(path), ["rad", "s"], None)[0].values) == 4
+
+
+@pytest.mark.parametrize(
+    ("head", "rows", "unit", "guessed"),
+    [
+        ("x_cm,y", "80,2.3 105,-1.8", "cm", False),
+        ("x [mm],y", "800,2.3 1050,-1.8", "mm", False),
+        ("x_cm,y", "80,23 105,-18", "cm", True),
+    ],
+)
+def test_a_length_without_a_unit_beside_one_of_a_unit_is_asked_about(
+    tmp_path, head, rows, unit, guessed
+):
+    text = [f"{i},{row}" for i, row in enumerate(rows.split())]
+    found = read_outcomes(table(tmp_path, "\n".join([f"episode,{head}", *text])))
+    seen, (doubt,) = in_units(found, ["m", "m"], None)
+    assert (doubt.option, doubt.guessed) == (f"--outcome-unit {unit}", guessed)
+    assert f"beside x in {unit}" in doubt.what
+    scale = base_of(unit)[1]
+    np.testing.assert_allclose(seen.values, found.values * [1, scale])
+    confirmed, none = in_units(found, ["m", "m"], unit)
+    np.testing.assert_allclose(confirmed.values, seen.values)
+    assert none == ()
+
+
+def test_the_deviation_of_a_length_without_a_unit_is_in_its_unit(tmp_path):
+    found = read_outcomes(table(tmp_path, "episode,y,x_cm,sd\n0,23,80,2\n1,-18,105,3\n"))
+    np.testing.assert_allclose(in_units(found, ["m", "m"], None)[0].sd, (0.02, 0.03))

@@ -58,6 +58,8 @@ def in_units(
             f"{SD} in {where} is one number for components in {', '.join(wanted)}; leave that "
             "column out"
         )
+    outcomes, shared = _shared_unit(outcomes, wanted) if given is None else (outcomes, ())
+    said = outcomes.units
     _refuse_odd_row(outcomes, wanted, given)
     reach = np.abs(outcomes.values).max(axis=0, initial=0.0, where=~np.isnan(outcomes.values))
     unsaid = {
@@ -115,7 +117,38 @@ def in_units(
             f"{SD} in {where} is up to {most:.4g} {first}{as_wide}; say its unit in its head: "
             f"{SD} [{looks}], or {SD} [{first}] if that is right"
         )
-    return converted, ambiguities
+    return converted, (*shared, *ambiguities)
+
+
+def _shared_unit(
+    outcomes: Outcomes, wanted: Sequence[str]
+) -> tuple[Outcomes, tuple[Ambiguity, ...]]:
+    """Give lengths of no unit that of the others, `cm` of `x_cm, y`, and ask about it.
+
+    It cannot be guessed where their numbers look like the wanted unit.
+    """
+    scale, k = np.array(outcomes.scale), range(len(wanted))
+    lengths = [j for j in k if kind_of(wanted[j]) == "length"]
+    unsaid = [j for j in lengths if outcomes.units[j] is None]
+    sizes, said = units_of("length"), [j for j in lengths if outcomes.units[j] == "m"]
+    units = {unit for unit, size in sizes.items() if size in scale[said]}
+    if not unsaid or len(units) != 1 or units == {wanted[unsaid[0]]}:
+        return outcomes, ()
+    (unit,), plain = units, wanted[unsaid[0]]
+    far = float(np.nanmax(np.abs(outcomes.values[:, unsaid]), initial=0.0))
+    own, other = (" and ".join(outcomes.names[j] for j in each) for each in (unsaid, said))
+    asked = Ambiguity(
+        f"in {outcomes.where}, {own} (up to {far:.4g}) has no unit beside {other} in {unit}: it "
+        f"looks like {unit} as well (if it is in {plain}: --outcome-unit {plain})",
+        f"--outcome-unit {unit}",
+        guessed=judge_unit(plain, far) != plain,
+    )
+    factors = np.array([sizes[unit] if j in unsaid else 1.0 for j in k])
+    filled = tuple("m" if j in unsaid else outcomes.units[j] for j in k)
+    values, sd = outcomes.values * factors, outcomes.sd
+    sd = sd if outcomes.sd_unit else sd * factors[0]
+    scales = tuple((scale * factors).tolist())
+    return replace(outcomes, values=values, sd=sd, units=filled, scale=scales), (asked,)
 
 
 def _refuse_one_unit(outcomes: Outcomes, wanted: Sequence[str], unclear: Sequence[str]) -> None:
