@@ -5,11 +5,19 @@ import pytest
 from prior_reinforce.arm.recordings.outcome_names import (
     columns_of,
     digits_at_end,
+    keys_of,
     number_of,
+    order_of,
+    other_places,
+    refuse_unlike,
     remedy_for,
+    rows_of,
+    telling_column,
     telling_word,
 )
-from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.arm.recordings.tables import read_table
+from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError
+from tests.arm.recordings.recorded import table
 
 
 def test_the_seconds_of_a_time_are_no_number_of_an_episode():
@@ -110,3 +118,83 @@ def test_errors_and_depths_are_not_to_be_renamed(there, says):
 
 def test_a_column_may_be_called_by_where_it_counts_up_to():
     assert columns_of(["x", "y"], ["X", "right"]) == {"x": [(0, 1)], "y": [(1, -1)]}
+
+
+THROWS = ["throw_1", "throw_2", "throw_3", "throw_4"]
+
+
+def told(tmp_path, head, rows, there):
+    """Row of each recording, of a table with columns that may name it."""
+    cells = read_table(
+        table(tmp_path, f"{head},x,y\n" + "".join(f"{r},1,0\n" for r in rows.split()))
+    )
+    named = range(len(cells.names) - 2)
+    word, found = telling_column(keys_of(cells, 0, [*named]), there, there, "t.csv")
+    return [*rows_of(there, word, found).values()]
+
+
+@pytest.mark.parametrize("head", ["trial,episode", "run,throw", "take,throw"])
+def test_two_columns_that_name_other_recordings_are_refused_by_name(tmp_path, head):
+    one, other = head.split(",")
+    with pytest.raises(
+        InvalidDemonstrationsError, match=f"in {one} and in {other} .* call it note"
+    ):
+        told(tmp_path, head, "1,4 2,1 3,3 4,2", THROWS)
+    assert told(tmp_path, head, "2,2 1,1 4,4 3,3", THROWS) == [1, 0, 3, 2]
+
+
+@pytest.mark.parametrize("cell", ["throw_{}.csv", "throw_{}", "rec/throw_{}.npz"])
+def test_the_column_of_the_recordings_exact_names_decides(tmp_path, cell):
+    rows = " ".join(f"{i},{cell.format(n)}" for i, n in enumerate((4, 1, 3, 2), 1))
+    assert told(tmp_path, "episode,file", rows, THROWS) == [1, 3, 2, 0]
+    assert told(tmp_path, "trial,episode", "1,3 2,2 3,1 4,0", [*"0123"]) == [3, 2, 1, 0]
+
+
+def test_columns_that_tell_rows_apart_together_are_both_in_the_recordings_names(tmp_path):
+    rows, names = "1,1 1,2 2,1 2,2", [f"run{i}_throw{j}" for j in (1, 2) for i in (1, 2)]
+    assert told(tmp_path, "run,throw", rows, names) == [0, 2, 1, 3]
+    with pytest.raises(
+        InvalidDemonstrationsError, match=r"run and throw together.*\(run_1_throw_1"
+    ):
+        told(tmp_path, "run,throw", rows, THROWS)
+    with pytest.raises(FileFormatError, match="line 4: episode 1, 2 again"):
+        told(tmp_path, "run,throw", "1,1 1,2 1,2 2,2", names)
+
+
+def test_a_session_beside_numbers_says_nothing_but_a_number_that_comes_again_does(tmp_path):
+    assert told(tmp_path, "run,throw", "1,2 1,1 2,4 2,3", THROWS) == [1, 0, 3, 2]
+    with pytest.raises(FileFormatError, match="line 5: episode 3 again"):
+        told(tmp_path, "trial,episode", "1,2 2,1 3,3 4,3", THROWS)
+
+
+def test_whole_numbers_with_decimals_are_numbers(tmp_path):
+    assert told(tmp_path, "episode", "0 2 1", ["0.0", "1.0", "2.0"]) == [0, 2, 1]
+    assert told(tmp_path, "episode", "2.0 1.0", ["throw_1", "throw_2"]) == [1, 0]
+
+
+def test_rows_of_motions_in_their_order_are_in_that_of_their_numbers():
+    assert order_of(["throw 12", "throw 3", "throw 7"]) == [2, 0, 1]
+    assert order_of(["1", "1", "0"]) == order_of(["a", "b", "c"]) == [0, 1, 2]
+
+
+def test_columns_that_name_some_recordings_alike_agree():
+    keys = [("trial", ("1", "2")), ("episode", ("1", "9"))]
+    refuse_unlike("t.csv", keys, [{"a": 0, "b": 1}, {"a": 0}])
+    with pytest.raises(InvalidDemonstrationsError, match="in trial and in episode"):
+        refuse_unlike("t.csv", keys, [{"a": 0}, {"b": 0}])
+
+
+@pytest.mark.parametrize(
+    "others", ["landing_x landing_y", "x_meas y_meas", "xLanded yLanded", "x2 y2"]
+)
+def test_other_columns_that_may_be_the_outcomes_are_asked_about(tmp_path, others):
+    with pytest.raises(
+        FileFormatError, match=others.replace(" ", ", ") + " beside x, y: .*target_"
+    ):
+        other_places(tmp_path, ["x", "y"], others.split())
+
+
+def test_columns_that_are_no_outcomes_by_their_names_are_left_out(tmp_path):
+    beside = ["goal_x", "goal_y", "x_release", "y_release", "x_err", "y_err", "z", "speed", "x_cam"]
+    assert other_places(tmp_path, ["x", "y"], beside) == beside[:6]
+    assert other_places(tmp_path, [], beside) == []

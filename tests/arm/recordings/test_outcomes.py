@@ -494,3 +494,22 @@ def test_a_second_table_that_says_other_outcomes_is_named(tmp_path, name):
     meant = import_demonstrations(folder, outcomes=other)
     assert meant.demonstrations.outcomes_seen[0, 0] == 0.9
     assert str(path) not in meant.preview.text
+
+
+def test_the_file_that_a_row_names_beside_its_number_is_its_recording(recording, tmp_path):
+    order = [3, 0, 5, 1, 4, 2]
+    rows = [f"{k},{i}.csv,{','.join(map(str, OUTCOMES[str(i)]))}" for k, i in enumerate(order, 7)]
+    path = table(tmp_path, "\n".join(["episode,file,x,y", *rows]))
+    for names in (None, ("x", "y")):
+        seen = import_demonstrations(recording, outcomes=path, outcome_names=names)
+        np.testing.assert_allclose(seen.demonstrations.outcomes_seen, list(OUTCOMES.values()))
+
+
+def test_columns_of_targets_that_are_left_out_are_named(recording, tmp_path):
+    rows = [f"{row},1,0" for row in rows_of_outcomes()]
+    path = table(tmp_path, "\n".join(["episode,x,y,target_x,target_y", *rows]))
+    result = import_demonstrations(recording, outcomes=path, outcome_names=("x", "y"))
+    assert "target_x, target_y left out" in result.preview.text
+    path.write_text(path.read_text().replace("target", "landing"))
+    with pytest.raises(FileFormatError, match="landing_x, landing_y beside x, y"):
+        import_demonstrations(recording, outcomes=path, outcome_names=("x", "y"))

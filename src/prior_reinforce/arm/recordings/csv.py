@@ -22,7 +22,8 @@ from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.clock import NO_COLUMN
 from prior_reinforce.arm.recordings.naming import find_channels, numbered_like, vectors, words
 from prior_reinforce.arm.recordings.options import ReadOptions
-from prior_reinforce.arm.recordings.outcomes import rows_of
+from prior_reinforce.arm.recordings.outcome_names import names_in
+from prior_reinforce.arm.recordings.outcomes import key_column
 from prior_reinforce.arm.recordings.recording import (
     EPISODE_COLUMNS,
     ROW_COLUMNS,
@@ -138,7 +139,8 @@ def _has_a_row_each(table: Table, episodes: Sequence[str]) -> bool:
     """Whether each row is of another episode, as in a table of outcomes."""
     if not 1 < len(table) <= len(episodes):  # a recording's cells are not looked through for it
         return False
-    key, rows = rows_of(table)
+    key = key_column(table)
+    rows = () if key is None else names_in(table, key)
     said = key is not None and table.names[key].lower() in ROW_COLUMNS
     return len({*rows}) == len(table) and (said or not {*rows}.isdisjoint(episodes))
 

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Collection, Mapping, Sequence
+from itertools import combinations
+from pathlib import Path
 
-from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.arm.recordings.recording import ROW_COLUMNS
+from prior_reinforce.arm.recordings.tables import Table
+from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError
+from prior_reinforce.files import from_cell
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.wording import PLACE_WORDS, axes_of
 
@@ -27,6 +33,27 @@ _ERRORS = re.compile(
     r"fehler|abweichung)([^a-z].*)?"
 )
 """Names of what is measured from a target."""
+_NO_OUTCOMES = {
+    "target",
+    "goal",
+    "aim",
+    "aimed",
+    "desired",
+    "wanted",
+    "planned",
+    "reference",
+    "ref",
+}
+_NO_OUTCOMES |= {"command", "commanded", "cmd", "release", "released", "start", "initial", "begin"}
+"""Words in the names of places that are not where the object landed."""
+_WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
+FILE = re.compile(
+    r"(?:.*[/\\])?([^/\\]+)\.(?:csv|tsv|txt|npz|npy|hdf5|h5|bag|mcap|db3|zarr|mp4|avi|jpe?g|png)",
+    re.IGNORECASE,
+)
+"""Path of a recording, or of what was filmed beside it, by which a row may call its episode."""
+Key = tuple[str, tuple[str, ...]]
+"""Name and cells of a column that may say of which recording each row is."""
 
 
 def digits_at_end(name: str) -> str:
@@ -34,7 +61,7 @@ def digits_at_end(name: str) -> str:
 
     The last digits of a time, `2024-05-03_14-02-03` or `14-02-03`, are no number of an episode.
     """
-    match = re.search(r"0*([0-9]+)$", name)
+    match = re.search(r"0*([0-9]+)$", _whole(name))
     return match[1] if match and not _DATED.search(name) else ""
 
 
@@ -43,9 +70,14 @@ def number_of(name: str, word: str) -> str:
     return _numbers(name).get(word) or digits_at_end(name)
 
 
+def _whole(name: str) -> str:
+    """A whole number without the decimals that pandas writes, `1` for `1.0`; another as it is."""
+    return re.sub(r"^(\d+)\.0+$", r"\1", name)
+
+
 def _numbers(name: str) -> dict[str, str]:
     """Numbers that are no dates, by the word before each, or by the signs if there is none."""
-    found = _NUMBER.findall(_DATES.sub("#", name))
+    found = _NUMBER.findall(_DATES.sub("#", _whole(name)))
     return {word.lower() or signs or "#": number for word, signs, number in found}
 
 
@@ -83,6 +115,108 @@ def telling_word(
     return ""
 
 
+def names_in(table: Table, column: int) -> tuple[str, ...]:
+    """Return what a column calls recordings: files without their folder and ending."""
+    cells = [from_cell(cell) for cell in table.cells[column]]
+    return tuple(file[1] if (file := FILE.fullmatch(cell)) else cell for cell in cells)
+
+
+def keys_of(table: Table, first: int, beside: Collection[int]) -> list[Key]:
+    """Return columns that may name the recordings: the first, others called so, and texts.
+
+    A column of few labels, as of sessions, does not where another has one for each row.
+    FileFormatError if a row comes again.
+    """
+    lower = [name.lower() for name in table.names]
+    named = [first, *(i for i in beside if i != first and lower[i] in ROW_COLUMNS)]
+    texts = [i for i in beside if i not in named and table.is_text(i)]
+    cells = {i: names_in(table, i) for i in (*named, *texts)}
+    few = [i for i in named if 2 * len({*cells[i]}) <= len(table)]
+    alone = [i for i in named if len({*cells[i]}) == len(table)]
+    for together in [[i] for i in named if i not in few] if alone else [named]:
+        labels = list(zip(*(cells[i] for i in together), strict=True))
+        for row, label in enumerate(labels):
+            if label in labels[:row]:
+                where = f"{table.where}, line {table.lines[row]}"
+                raise FileFormatError(
+                    f"{where}: episode {', '.join(label)} again; drop one of them"
+                )
+    return [(lower[i], cells[i]) for i in (*(alone or named), *texts)]
+
+
+def order_of(cells: Sequence[str]) -> list[int]:
+    """Return each row's place in the order of the numbers in its cells, or of the rows."""
+    numbers = [digits_at_end(cell) for cell in cells]
+    if not all(numbers) or len({*numbers}) < len(numbers):
+        return [*range(len(cells))]
+    return [sorted(map(int, numbers)).index(int(number)) for number in numbers]
+
+
+def rows_of(episodes: Sequence[str], word: str, cells: Sequence[str]) -> dict[str, int]:
+    """Return row by episode, in their order; a number of two names matches none."""
+    numbers = [number_of(episode, word) for episode in episodes]
+    there, rows = list(map(digits_at_end, cells)), dict[str, int]()
+    for episode, number in zip(episodes, numbers, strict=True):
+        if episode in cells:
+            rows[episode] = cells.index(episode)
+        elif number and numbers.count(number) == 1 and there.count(number) == 1:
+            rows[episode] = there.index(number)
+    return rows
+
+
+def telling_column(
+    keys: Sequence[Key], chosen: Sequence[str], there: Sequence[str], where: str
+) -> Key:
+    """Return the cells that name most of the `chosen` episodes, and their `telling_word`.
+
+    InvalidDemonstrationsError if the columns differ in which recording a row is of.
+    """
+    keys, each = _telling_columns(keys, there, where), list[Key]()
+    for head, cells in keys:
+        each.append((telling_word(head.split("_")[0], chosen, there, cells), cells))
+    matches = [rows_of(chosen, *key) for key in each]
+    refuse_unlike(where, keys, matches)
+    return each[max(range(len(each)), key=lambda i: len(matches[i]))]
+
+
+def _telling_columns(keys: Sequence[Key], there: Sequence[str], where: str) -> Sequence[Key]:
+    """The columns that hold most of the recordings' exact names, else those called so.
+
+    Where each repeats itself, that is one of the names of recordings numbered by all.
+    InvalidDemonstrationsError if there are none.
+    """
+    exact = [len({*cells}.intersection(there)) for _, cells in keys]
+    named = [key for i, key in enumerate(keys) if i == 0 or key[0] in ROW_COLUMNS]
+    alone = [key for key in named if len({*key[1]}) == len(key[1])]
+    if max(exact) and (alone or keys[exact.index(max(exact))] not in named):
+        return [key for key, number in zip(keys, exact, strict=True) if number == max(exact)]
+    if alone or len(named) < 2:
+        return alone or named
+    words = [head.split("_")[0] for head, _ in named]
+    of = defaultdict[tuple[str | None, ...], list[str]](list)
+    for name in there:
+        of[tuple(map(_numbers(name).get, words))].append(name)
+    rows = list(zip(*(map(digits_at_end, cells) for _, cells in named), strict=True))
+    if any(len(of[row]) != 1 for row in rows):
+        both, name = " and ".join(head for head, _ in named), "_".join(f"{w}_1" for w in words)
+        raise InvalidDemonstrationsError(
+            f"{where} tells its rows apart by {both} together, and the recordings are not called "
+            f"by both ({name}): write their names in one column, episode, instead"
+        )
+    return [(words[-1], tuple(of[row][0] for row in rows))]
+
+
+def refuse_unlike(where: str, keys: Sequence[Key], matches: Sequence[Mapping[str, int]]) -> None:
+    """InvalidDemonstrationsError if by two columns an episode has another row, or a row another."""
+    for (one, own), (other, of_other) in combinations(zip(keys, matches, strict=True), 2):
+        pairs = {*own.items(), *of_other.items()}
+        if not len({e for e, _ in pairs}) == len({row for _, row in pairs}) == len(pairs):
+            raise InvalidDemonstrationsError(
+                f"{where} says in {one[0]} and in {other[0]} of which recording a row is, and they "
+                "differ: take out the one that does not, or call it note"
+            )
+
+
 def how_to_renumber(word: str, episodes: Sequence[str], rows: Sequence[str]) -> str:
     """Say what to do where rows may be numbered otherwise than the episodes; else empty."""
     ours = [number_of(name, word) for name in episodes]
@@ -114,6 +248,31 @@ def columns_of(names: Sequence[str], there: Sequence[str]) -> dict[str, list[tup
         signs = {name.lower(): 1} | dict(zip(words, (1, -1), strict=False))
         found[name] = [(i, signs[n.lower()]) for i, n in enumerate(there) if n.lower() in signs]
     return found
+
+
+def other_places(path: Path, names: Collection[str], beside: Sequence[str]) -> list[str]:
+    """Return columns that are no outcomes by their names, `goal_x` and `goal_y` beside `x` and `y`.
+
+    FileFormatError if others, as `landing_x` and `landing_y`, may be the outcomes as well.
+    """
+    sets = defaultdict[tuple[str, ...], dict[str, str]](dict)
+    for name in beside:
+        words = [word.lower() for word in _WORDS.findall(name)]
+        for i, word in enumerate(words):
+            sets[(*words[:i], *words[i + 1 :])][word] = name
+    left_out = list[str]()
+    for rest, found in sets.items() if names else ():
+        if not rest or not all(columns_of([*names], [*found]).values()):
+            continue
+        others = list(found.values())
+        if not _NO_OUTCOMES.intersection(rest) and not all(map(_ERRORS.fullmatch, others)):
+            own = ", ".join(names)
+            raise FileFormatError(
+                f"{path} has {', '.join(others)} beside {own}: call where the object landed {own}, "
+                "and take out the other columns, or put target_ or release_ before their names"
+            )
+        left_out += others
+    return left_out
 
 
 def remedy_for(missing: Sequence[str], there: Sequence[str]) -> str:

@@ -22,12 +22,19 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.arm.recordings.outcome_names import (
+    FILE,
+    Key,
     columns_of,
     digits_at_end,
     how_to_renumber,
+    keys_of,
     number_of,
+    order_of,
+    other_places,
+    refuse_unlike,
     remedy_for,
-    telling_word,
+    rows_of,
+    telling_column,
 )
 from prior_reinforce.arm.recordings.recording import ROW_COLUMNS
 from prior_reinforce.arm.recordings.tables import Table, read_table
@@ -40,7 +47,7 @@ from prior_reinforce.arm.recordings.units import (
 )
 from prior_reinforce.arrays import Points
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError
-from prior_reinforce.files import as_cell, from_cell, named_disk_errors, write
+from prior_reinforce.files import as_cell, named_disk_errors, write
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.units import base_of
 from prior_reinforce.wording import listed
@@ -54,11 +61,6 @@ _WITH_UNIT = re.compile(r"([-+\d.,]+) *([^\d\s.,]+)")
 """A number and its unit in one cell."""
 _SIDED = re.compile(r"(?i)(?<![a-z])(l|r|left|right|links|rechts)(?![a-z])")
 """Words of a side beside a number: `10 L`."""
-_FILE = re.compile(
-    r"(?:.*[/\\])?([^/\\]+)\.(?:csv|tsv|txt|npz|npy|hdf5|h5|bag|mcap|db3|zarr|mp4|avi|jpe?g|png)",
-    re.IGNORECASE,
-)
-"""Path of a recording, or of what was filmed beside it, by which a row may call its episode."""
 _UNCERTAINTY = re.compile(r"(.*[^a-z])?(sd|std|stdev|sigma|stderr|uncertainty)([^a-z].*)?|.*±.*")
 _SEMICOLONS = "semicolons, where a comma is the decimal sign"
 SOURCE = "source"
@@ -92,6 +94,8 @@ class Outcomes:
     """Cells by row of a column `source`, if there is one: whose answers they are."""
     word: str = ""
     """Word in the episodes' names whose number a row may give instead of the one at the end."""
+    also: tuple[Key, ...] = ()
+    """Other columns that may name the episodes."""
     scale: tuple[float, ...] = ()
     """What each component's numbers were multiplied with."""
     remarks: tuple[str, ...] = ()
@@ -184,14 +188,13 @@ def keep_places(
         write_outcome_table(table, rows, *heads, beside=SOURCE if beside else "note")
 
 
-def rows_of(table: Table) -> tuple[int | None, list[str]]:
-    """Return the column that names recordings, called so or the first of texts, and its names."""
+def key_column(table: Table) -> int | None:
+    """Return the column that names recordings: the first called so, or one of texts at the left."""
     bare = [split_unit(name, any_word=True)[0].lower() for name in table.names]
     key = next((i for i, name in enumerate(bare) if name in ROW_COLUMNS), None)
     if key is None and table.named and bare[0] not in _NOT_COMPONENTS and table.is_text(0):
-        key = 0
-    cells = [] if key is None else [from_cell(cell) for cell in table.cells[key]]
-    return key, [file[1] if (file := _FILE.fullmatch(cell)) else cell for cell in cells]
+        return 0
+    return key
 
 
 def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
@@ -209,9 +212,10 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
     wanted = {f"{name}_in": (name, "in") for name in names or ()}
     split = [wanted.get(name, (name, unit)) for name, unit in split]
     lower = [name.lower() for name, _ in split]
-    key, rows = rows_of(table)
+    key = key_column(table)
     other = (*_NOT_COMPONENTS, *ROW_COLUMNS)
-    columns = [i for i, name in enumerate(lower) if i != key and name not in other]
+    files = [i for i, cells in enumerate(table.cells) if cells and all(map(FILE.fullmatch, cells))]
+    columns = [i for i, name in enumerate(lower) if i not in (key, *files) and name not in other]
     meant = columns_of(names or (), [split[i][0] for i in columns])
     if meant and all(meant.values()):  # others may hold anything
         own = {i for each in meant.values() for i, _ in each}
@@ -228,6 +232,7 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
             f"{path} says uncertainties in {', '.join(spreads)}, but a row has one, in a column "
             f"{SD}: write the largest of each row there, and take the others out"
         )
+    left_out = other_places(path, meant, [n for i, (n, _) in enumerate(split) if i not in columns])
     twice = next((own for own in kept if kept.count(own) > 1), None)
     if key is None or not columns or twice:
         both = [table.names[i] for i, own in zip(columns, kept, strict=True) if own == twice]
@@ -242,12 +247,9 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
     _doubt_thousands(table, dict(zip(columns, units, strict=True)))
     scale = [base_of(unit)[1] if unit else 1.0 for unit in units]
     sd, source = (lower.index(name) if name in lower else None for name in (SD, SOURCE))
-    filled = [r for r in range(len(table)) if any(table.cells[i][r] for i in columns)]
-    table, rows = table.rows(filled), [rows[r] for r in filled]
-    for row, name in enumerate(rows):
-        if name in rows[:row]:
-            line = table.lines[row]
-            raise FileFormatError(f"{path}, line {line}: episode {name} again; drop one of them")
+    table = table.rows([r for r in range(len(table)) if any(table.cells[i][r] for i in columns)])
+    aside = [i for i in range(len(lower)) if i not in columns and lower[i] not in _NOT_COMPONENTS]
+    (head, rows), *also = keys_of(table, key, aside)
     values = np.zeros((len(rows), len(columns)))
     sds = np.zeros(len(rows))
     for row in range(len(rows)):
@@ -257,15 +259,17 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
     sd_unit = None if sd is None else table.units[sd] or split[sd][1]
     return Outcomes(
         str(path),
-        tuple(rows),
+        rows,
         values * scale,
         sds if sd_unit else scale[0] * sds,
         tuple(kept),
         tuple(base_of(unit)[0] if unit else None for unit in units),
         sd_unit,
         sources=() if source is None else tuple(table.cells[source]),
-        word=lower[key].split("_")[0],
+        word=head.split("_")[0],
+        also=(*also,),
         scale=tuple(scale),
+        remarks=(f"{path}: {', '.join(left_out)} left out",) * bool(left_out),
     )
 
 
@@ -313,7 +317,7 @@ def places_of(episodes: Sequence[str], outcomes: Outcomes) -> dict[str, Place]:
     """Return where each episode's object landed, if that is known, by the rule of `outcomes_of`."""
     return {
         episode: (*outcomes.values[row].tolist(), float(outcomes.sd[row]))
-        for episode, row in _rows(episodes, outcomes).items()
+        for episode, row in rows_of(episodes, outcomes.word, outcomes.episodes).items()
         if np.all(np.isfinite(outcomes.values[row]))
     }
 
@@ -328,7 +332,7 @@ def beside_tables(
     unlike = [str(other) for other in others if own is not None and _differs(other, found)]
     said = "has other numbers for these recordings: if it is meant,"
     each = (f"{other} {said} {shlex.join(['--outcomes', other])}" for other in unlike)
-    return replace(found, remarks=(*each,)), ()
+    return replace(found, remarks=(*found.remarks, *each)), ()
 
 
 def _differs(path: Path, outcomes: Outcomes) -> bool:
@@ -342,7 +346,7 @@ def _differs(path: Path, outcomes: Outcomes) -> bool:
 
 def missing_outcomes(episodes: Sequence[str], outcomes: Outcomes) -> list[str]:
     """Return the episodes that a table lacks, by the rule of `outcomes_of`."""
-    there = _rows(episodes, outcomes)
+    there = rows_of(episodes, outcomes.word, outcomes.episodes)
     return [episode for episode in episodes if episode not in there]
 
 
@@ -352,15 +356,16 @@ def check_rows(
     """Check that every row is of one of the `chosen` episodes, or of another that is `there`.
 
     With `others`, rows of none are no mistake unless the table looks numbered from another number.
-    Returns the outcomes with the `word` that holds for the episodes.
+    Returns the outcomes with the `episodes` and the `word` that hold for the recordings.
 
     Raises:
-        InvalidDemonstrationsError: A row is of none, or several numbers fit (`telling_word`).
+        InvalidDemonstrationsError: A row is of none, or several numbers fit (`telling_word`), or
+            columns differ (`telling_column`).
     """
-    rows = outcomes.episodes
-    word = telling_word(outcomes.word, chosen, there, rows)
-    outcomes = replace(outcomes, word=word)
-    picked = {rows[row] for row in _rows(chosen, outcomes).values()}
+    keys = (outcomes.word, outcomes.episodes), *outcomes.also
+    word, rows = telling_column(keys, chosen, there, outcomes.where)
+    outcomes = replace(outcomes, word=word, episodes=rows)
+    picked = {rows[row] for row in rows_of(chosen, outcomes.word, outcomes.episodes).values()}
     known = {*there} | picked | {number_of(name, word) for name in there} - {""}
     unknown = [name for name in rows if name not in known and digits_at_end(name) not in known]
     if unknown and {*outcomes.names} & {*there}:
@@ -390,11 +395,10 @@ def in_order(source: Path, motions: Sequence[str], outcomes: Outcomes, advice: s
             f"{source} was cut into {len(motions)} motions, and {outcomes.where} has {len(rows)} "
             f"outcomes: name each outcome's motion ({motions[0]}); {advice or remedy}"
         )
-    numbers = [digits_at_end(name) for name in rows]
-    if all(numbers) and len({*numbers}) == len(numbers):
-        order = sorted(map(int, numbers))
-        motions = [motions[order.index(int(number))] for number in numbers]
-    return replace(outcomes, episodes=tuple(motions))
+    keys = [(outcomes.word, rows), *(key for key in outcomes.also if key[0] in ROW_COLUMNS)]
+    orders = [order_of(cells) for _, cells in keys]
+    refuse_unlike(outcomes.where, keys, [dict(zip(motions, o, strict=True)) for o in orders])
+    return replace(outcomes, episodes=tuple(motions[i] for i in orders[0]))
 
 
 def outcomes_of(
@@ -419,7 +423,7 @@ def outcomes_of(
             f"{listed(there) or 'none'}); {renumber}measure and add them, or "
             f"leave those episodes out, --leave-out {shlex.join(missing)}{'; ' * bool(back)}{back}"
         )
-    rows = list(_rows(episodes, outcomes).values())
+    rows = list(rows_of(episodes, outcomes.word, outcomes.episodes).values())
     values = outcomes.values[rows]
     for episode, row in zip(episodes, values, strict=True):
         if not np.all(np.isfinite(row)):
@@ -428,15 +432,3 @@ def outcomes_of(
                 "measure it, or leave that episode out"
             )
     return values, np.tile(outcomes.sd[rows, None], values.shape[1])
-
-
-def _rows(episodes: Sequence[str], outcomes: Outcomes) -> dict[str, int]:
-    """Row by episode, in their order; a number of two names matches none."""
-    numbers = [number_of(episode, outcomes.word) for episode in episodes]
-    there, rows = list(map(digits_at_end, outcomes.episodes)), dict[str, int]()
-    for episode, number in zip(episodes, numbers, strict=True):
-        if episode in outcomes.episodes:
-            rows[episode] = outcomes.episodes.index(episode)
-        elif number and numbers.count(number) == 1 and there.count(number) == 1:
-            rows[episode] = there.index(number)
-    return rows
