@@ -88,6 +88,20 @@ def test_whatever_tells_the_time_is_held_against_the_rate(tmp_path, head, late):
     np.testing.assert_allclose(recording.times, np.arange(100) / 50, atol=0.005)
 
 
+@pytest.mark.parametrize(("head", "origin"), [("unix", 1.7e9), ("recv", 50.0)])
+def test_a_clock_of_any_name_that_contradicts_the_times_is_refused(tmp_path, head, origin):
+    recorded_at_50(tmp_path, f"t,{head}", lambda t: np.column_stack([t, origin + 1.25 * t]))
+    with pytest.raises(
+        FileFormatError, match=f"t says 50 .*{head} steps by 0.025; .*-column t, or"
+    ):
+        read_recordings(tmp_path, joints=["a", "b"])
+    if head == "unix":  # where no joints are known, only the size of its numbers says so
+        with pytest.raises(FileFormatError, match="say which is the time"):
+            read_recordings(tmp_path)
+        assert read_recordings(tmp_path, time_column="t")[0].names == ("a", "b")
+    assert read_recordings(tmp_path, joints=["a", "b"], time_column=head)[0].period > 0.024
+
+
 @pytest.mark.parametrize("head", ["frame", "nr", ""])
 def test_a_counter_that_skips_says_where_frames_are_missing(tmp_path, head):
     recorded_at_50(tmp_path, head, lambda t: np.round(t * 50) + 12 * (t > 0.99))

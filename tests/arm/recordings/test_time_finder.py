@@ -106,6 +106,40 @@ def test_of_arrays_only_one_that_runs_as_the_rate_says_is_held_against_it():
     assert other_times("a", places(frame=2 * T), None, in_arrays=True).columns == ()
 
 
+@pytest.mark.parametrize(
+    ("name", "values", "held"),
+    [
+        ("recv", 50 + 1.25 * T, True),
+        ("host_clk", 1e9 * (5e3 + 2 * T), True),
+        ("perf_counter", 33 + 0.5 * T, True),
+        ("recv", T + 2.0 * (T > 2), True),  # the same clock, which goes on where frames were lost
+        ("unix", 1.7e9 + 5 * T, True),
+        ("n", 1.7e15 + 1.25e6 * T, True),
+        ("progress", T / 4, False),
+        ("belt", 50 + 0.25 * T, False),
+        ("belt", 0.1 + 0.8 * T, False),
+        ("cycles", 5000 + 10.0 * np.arange(101), False),
+        ("swing", 50 + np.cumsum(0.05 * (1 + np.sin(T))), False),
+    ],
+)
+def test_a_clock_of_any_name_is_held_against_the_times(name, values, held):
+    found = find_times("a", places(t=T, **{name: values}), (0,), no_motion=True)
+    assert found.held == ((1,) if held else ())
+
+
+@pytest.mark.parametrize("faster", [0.5, 1.1, 1.25, 2.0])
+def test_a_clock_of_any_name_is_held_against_a_rate(faster):
+    for origin, scale in ((50, 1), (5e12, 1e9)):
+        columns = places(q=np.sin(T), perf_counter=origin + scale * faster * T)
+        assert other_times("a", columns, 20.0, in_arrays=True).columns == (1,)
+    assert find_times("a", places(unix=1.7e9 + faster * T), ()).columns == (0,)
+
+
+def test_a_joint_that_rises_evenly_is_no_clock():
+    columns = places(t=T, q=2 + 1.25 * T)
+    assert find_times("a", columns, (0,)).held == ()
+
+
 def test_what_is_called_a_time_and_rises_unevenly_is_asked_about():
     uneven = np.append(T, T[-1] + 3.0)
     (doubt,) = find_times("a", places(time_in_contact=uneven), ()).guessed

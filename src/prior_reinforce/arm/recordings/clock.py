@@ -259,7 +259,8 @@ def clock_among(
     every = {name: (name, array) for name, array in arrays.items()}
     called = [name for name in arrays if split_unit(name, SECONDS)[0] in _CALLED]
     fit = {n: own for n, own in every.items() if own[1].shape == (count,) and n not in motion}
-    found = find_times(where, fit | {name: every[name] for name in called}, called)
+    free = fit | {name: every[name] for name in called}
+    found = find_times(where, free, called, no_motion=True)
     timed = asked not in (None, NO_COLUMN) and found.columns
     said = {n: v for n, v in (said or {}).items() if not _are_periods(n, v, count)}
     if asked == NO_COLUMN and options.rate is not None:  # what is no number is left unread

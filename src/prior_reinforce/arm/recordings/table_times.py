@@ -115,7 +115,8 @@ def time_columns(table: Table, options: ReadOptions, others: Sequence[int | None
     free = _columns(table, [i for i in range(len(table.names)) if i not in others])
     dated = [i for i in free if table.is_unnamed(i) and table.nanoseconds(i) is not None]
     called = [i for i in (*called, *(i for i in dated if rises(free[i][1]))) if i in free]
-    found = find_times(table.where, free, called)
+    # Beside the column of episodes, the others are joints, if these are known.
+    found = find_times(table.where, free, called, no_motion=len(others) > 1)
     if found.columns:
         return found
     rate = options.rate or _declared(table, options).get("own_rate")

@@ -47,8 +47,15 @@ _PERIOD = re.compile(
 """What files call the time from one frame to the next."""
 _TICKS = (6.3e17, 6.6e17)
 """Numbers that are .NET's ticks of 100 ns since the year 1, from 1997 to 2092."""
-_NEARLY = 1.25
-"""Factor within which what rises must run as fast as a rate says, to be a clock. Ours."""
+_EPOCH = (1e9, 4.1e9)
+"""Seconds since 1970, from 2001 to 2099, in which a clock that is set counts."""
+_NEARLY, _ANY_SPEED = 1.25, 2.5
+"""Factors within which what rises must run as fast as a rate says, to be a clock: an array of any
+kind, and what steps as a sampler does. Ours."""
+_EVEN = 0.25
+"""Share of its step by which half the steps of a sampler differ at most. Ours: receivers jitter."""
+_FEW_COUNTS = 100
+"""Whole numbers with smaller steps count anything, cycles of a servo for instance. Ours."""
 _SAME_CLOCK = 0.01
 """Share by which two clocks of a recording differ at most. Ours."""
 
@@ -67,12 +74,15 @@ class FoundTimes(NamedTuple):
     guessed: tuple[Ambiguity, ...] = ()
 
 
-def find_times(where: object, columns: Columns, called: Collection[Any]) -> FoundTimes:
-    """Return the times among columns, none of which is a joint, by what their names say.
+def find_times(
+    where: object, columns: Columns, called: Collection[Any], *, no_motion: bool = False
+) -> FoundTimes:
+    """Return the times among columns, by what their names and numbers say.
 
     The first counts of those that are `called` so for certain, or rise steadily and say that they
     are a time; else of those that say so and rise, which is asked about, or fall; else periods,
-    which are summed. FileFormatError if columns of one name are times that differ.
+    which are summed. Where `no_motion` is among the columns, what steps as a sampler does is held
+    against it too. FileFormatError if columns of one name are times that differ.
     """
     times = [*called, *(i for i, each in columns.items() if tells_time(*each))]
     increasing = [
@@ -86,8 +96,13 @@ def find_times(where: object, columns: Columns, called: Collection[Any]) -> Foun
         periods = tuple(i for i, each in columns.items() if is_periods(*each))
         return FoundTimes(periods[:1], summed=bool(periods))
     _refuse_several(where, [own for i, own in columns.items() if i in times])
-    skipping = [i for i, (_, own) in columns.items() if skips_frames(own)]
-    first, *held = dict.fromkeys([*times, *increasing, *skipping])
+    rate = _rate_of(columns[times[0]][1])
+    others = [
+        i
+        for i, (_, own) in columns.items()
+        if skips_frames(own) or (no_motion and _samples(rate, own))
+    ]
+    first, *held = dict.fromkeys([*times, *increasing, *others])
     doubts: tuple[Ambiguity, ...] = ()
     if not is_sure and first in increasing and len(columns[first][1]) > 2:
         name, steps = columns[first][0], np.diff(columns[first][1].astype(float))
@@ -111,8 +126,7 @@ def other_times(
         long = [i for i in rising if len(columns[i][1]) >= FEWEST_COUNTS]
         rising = [i for i in long if np.any(np.diff(columns[i][1]) != 1)]
     if in_arrays:
-        rising = [i for i in rising if not COUNTER.search(columns[i][0].lower())]
-        rising = [i for i in rising if rate is None or _runs_at(rate, columns[i][1])]
+        rising = [i for i in rising if _may_be_clock(rate, *columns[i])]
         rising = rising if len(rising) == 1 else []
     if rate is not None:
         skipping = [i for i, (_, own) in columns.items() if skips_frames(own)]
@@ -175,8 +189,8 @@ def rises(values: Stamps) -> bool:
 
 def tells_time(name: str, values: Stamps) -> bool:
     """Whether a column rises steadily, and its name, its unit or its numbers say it is a time."""
-    said = says_time(name) or split_unit(name, SECONDS)[1] is not None or are_ticks(values)
-    return said and rises(values)
+    said = says_time(name) or split_unit(name, SECONDS)[1] is not None
+    return (said or are_ticks(values) or epoch_unit(values) is not None) and rises(values)
 
 
 def counts_down(name: str, values: Stamps) -> bool:
@@ -184,11 +198,57 @@ def counts_down(name: str, values: Stamps) -> bool:
     return says_time(name) and rises(-values.astype(float))
 
 
-def _runs_at(rate: float, stamps: Stamps) -> bool:
-    """Whether a column rises, in some unit of time, about as fast as frames come at a rate."""
-    step = float(np.median(np.diff(stamps.astype(float))))
-    scales = (scale for unit, scale in SECONDS.items() if unit not in ("min", "h"))
-    return any(1 / _NEARLY < step * scale * rate < _NEARLY for scale in scales)
+def _rate_of(stamps: Stamps) -> float:
+    """Frames in the unit of their times; nan where these stand still."""
+    steps = np.abs(np.diff(stamps.astype(float).ravel()))
+    step = float(np.median(steps)) if steps.size else 0.0
+    return 1 / step if step > 0 else np.nan
+
+
+def _runs_at(rate: float, stamps: Stamps, factor: float) -> bool:
+    """Whether a column rises, in s, ms, us or ns, as fast as frames come at a rate, or nearly."""
+    faster = rate / _rate_of(stamps)
+    if not faster > 0:
+        return False
+    thousands = np.log(faster) / np.log(1000)
+    return bool(abs(thousands - np.round(thousands)) < np.log(factor) / np.log(1000))
+
+
+def _may_be_clock(rate: float | None, name: str, stamps: Stamps) -> bool:
+    """Whether an array that rises may be a clock, of frames at a rate if one is known."""
+    if rate is not None and _samples(rate, stamps):
+        return True
+    return not COUNTER.search(name.lower()) and (rate is None or _runs_at(rate, stamps, _NEARLY))
+
+
+def _samples(rate: float, stamps: Stamps) -> bool:
+    """Whether a column of any name steps as the clock of a sampler does, of frames at a rate.
+
+    It steps evenly. If its origin is farther away than it goes, as since a machine's start, it is
+    no share of a way, and may contradict that rate.
+    """
+    numbers = stamps.astype(float)
+    steps = np.diff(numbers, axis=0)
+    if numbers.ndim != 1 or len(steps) < FEWEST_COUNTS or not np.all(steps > 0):
+        return False
+    step = np.median(steps)
+    even = np.median(np.abs(steps - step)) < _EVEN * step
+    counts = np.all(numbers % 1 == 0) and step < _FEW_COUNTS
+    own_origin = numbers[0] > numbers[-1] - numbers[0]
+    factor = _ANY_SPEED if own_origin else 1 + _SAME_CLOCK
+    return bool(even and not counts) and _runs_at(rate, stamps, factor)
+
+
+def epoch_unit(values: Stamps) -> str | None:
+    """Return the unit, s, ms, us or ns, in which numbers are times since 1970; None if in none."""
+    if not values.size:
+        return None
+    ends = np.array([values.min(), values.max()], dtype=float)
+    for unit in ("s", "ms", "us", "ns"):
+        first, last = ends * SECONDS[unit]
+        if _EPOCH[0] <= first <= last <= _EPOCH[1]:
+            return unit
+    return None
 
 
 def skips_frames(values: Stamps) -> bool:
@@ -214,7 +274,11 @@ def is_clock(name: str, values: Times, times: Times) -> bool:
     if len(steps) < 2 or not np.all(steps > 0) or seconds <= 0:
         return False
     whole = bool(np.all(values % 1 == 0))
-    if says_time(name) or (whole and (np.median(steps) == 1 or COUNTER.search(name.lower()))):
+    if (
+        says_time(name)
+        or epoch_unit(values)
+        or (whole and (np.median(steps) == 1 or COUNTER.search(name.lower())))
+    ):
         return True
     rates = [(values[-1] - values[0]) * scale / seconds for scale in SECONDS.values()]
     line = values[0] + (values[-1] - values[0]) * (times - times[0]) / seconds
