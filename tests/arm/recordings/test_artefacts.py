@@ -56,6 +56,30 @@ def test_two_angles_that_flip_in_one_frame_are_refused():
         check(t, np.column_stack([0.1 + flips, 0.4 * s, flips - 0.3]), "rad")
 
 
+@pytest.mark.parametrize("rate", [20, 100, 500])
+@pytest.mark.parametrize("shift", [0.16, 0.5, 3600.0])
+def test_a_clock_that_leaps_while_the_joints_go_on_is_refused(rate, shift):
+    t, s = course(rate)
+    said = rf"episode 7: time leaps by {shift:.3f} s.* at frame \d+ .*--time-column none --rate HZ"
+    with pytest.raises(InvalidDemonstrationsError, match=said) as refused:
+        check(t + shift * (t > 0.86), np.column_stack([s, 0.4 * s]), "rad")
+    assert ("an hour" in str(refused.value)) == (shift == 3600)
+
+
+@pytest.mark.parametrize("rate", [20, 100, 500])
+def test_frames_that_were_lost_held_or_late_are_no_leap_of_the_clock(rate):
+    t, s = course(rate)
+    lost = (t < 0.7) | (t > 1.1)
+    check(t[lost], s[lost], "rad")
+    check(t + 0.5 * (t > 0.4) + 0.5 * (t > 1.4), s, "rad")  # a pause before, and one after
+    late = np.where((t > 0.7) & (t < 1.1), 1.09 + (t - 0.7) / 100, t)  # stalled, then all at once
+    check(late, s, "rad")
+    reaches = np.interp(np.arange(0, 1, 0.02), s[s > 0][:-1], t[s > 0][:-1])  # written at changes
+    check(np.append(reaches, 2.0), np.append(np.arange(0, 1, 0.02), 1.0), "rad")
+    swings = np.sin(2 * np.pi * t)
+    check(t[lost], swings[lost], "rad")
+
+
 @pytest.mark.parametrize("rate", [10, 20, 100, 500])
 @pytest.mark.parametrize("sigma", [0.0, 0.003])
 def test_steps_between_rests_and_lost_frames_are_none(rate, sigma):

@@ -46,6 +46,12 @@ _WAITS = 3.0
 """A stall takes more than so many times the usual wait for a new frame. Ours, as of a gap."""
 _ACROSS = 2.0
 """Across a stall a channel moves by so many times its steps around, and about as fast. Ours."""
+_SET, _SHIFT = 3.0, 0.1
+"""A clock was set if it goes on by more than so many periods, and by more than so long, in [s].
+Ours, as of header stamps in ROS."""
+_FAST = 0.5
+"""Part of its largest step by which a channel is in mid-motion there. Ours: a log of changes has
+pauses, before which an arm slows down."""
 _MOST, _FEWEST_VALUES = 0.9, 12
 """Values that are held for about one number of frames, of at least so many. Ours."""
 
@@ -54,8 +60,12 @@ Values = Float[np.ndarray, " T"]
 
 
 def refuse_leaps(recordings: Iterable[Recording], units: Sequence[str]) -> None:
-    """Refuse channels that leap in mid-motion: InvalidDemonstrationsError names both values."""
+    """Refuse channels, and clocks, that leap in mid-motion.
+
+    InvalidDemonstrationsError names both values.
+    """
     for recording in recordings:
+        _refuse_set_clock(recording)
         for channels, frame in _leaps(recording, units):
             q, names = recording.positions, [recording.names[i] for i in channels]
             said = " and ".join(
@@ -76,6 +86,32 @@ def refuse_leaps(recordings: Iterable[Recording], units: Sequence[str]) -> None:
                 f"episode {recording.episode}: {said} at {recording.times[frame + 1]:.3f} s, "
                 f"{why}; mend the recording, leave that episode out (--leave-out), or import the "
                 f"channels without {' and '.join(names)} (--joints)"
+            )
+
+
+def _refuse_set_clock(recording: Recording) -> None:
+    """Refuse times that leap while the joints go on by one frame's step: the clock was set."""
+    t, period = recording.times, recording.period
+    waits, steps = np.diff(t), np.diff(recording.positions, axis=0)
+    shifts = waits - period
+    for k in np.flatnonzero(shifts > max(_SHIFT, _SET * period)).tolist():
+        around = [i for i in (k - 2, k - 1, k + 1, k + 2) if 0 <= i < len(steps)]
+        usual, largest = steps[around].mean(axis=0), np.abs(np.delete(steps, k, axis=0)).max(axis=0)
+        fast = np.all(steps[around] * np.sign(usual) > _FAST * largest, axis=0)
+        share = steps[k, fast] / usual[fast]
+        goes_on = np.all((share > 1 / _ACROSS) & (share < _ACROSS))
+        # A log of changes waits longer as the arm slows down, and what stalled catches up after.
+        after = waits[k + 1 : k + 1 + round(waits[k] / period)]
+        even = np.max(waits[around]) < 2 * period and np.median(after) > period / 2
+        if len(around) == 4 and np.any(fast) and goes_on and even:
+            shift = f"{shifts[k]:.3f} s"
+            hour = " (an hour, as local time does in spring)" if round(shifts[k], 1) == 3600 else ""
+            raise InvalidDemonstrationsError(
+                f"episode {recording.episode}: time leaps by {shift}{hour} at frame {k + 1} "
+                f"({t[k]:.3f} s, then {t[k + 1]:.3f} s), while the joints go on by one frame's "
+                "step, so it is the times that are wrong, as where a clock was set: read the "
+                "frames at their known rate with --time-column none --rate HZ, correct the times "
+                "from there on, or leave that episode out (--leave-out)"
             )
 
 
