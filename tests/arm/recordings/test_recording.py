@@ -63,6 +63,19 @@ def test_times_that_fall_while_the_joints_go_on_are_wrong_and_no_order():
         Recording("a", order / 100, q[order])
 
 
+@pytest.mark.parametrize("count", [1, 6])
+def test_zeros_before_a_driver_is_up_are_left_out_as_those_at_the_end(count):
+    q = np.linspace([0.1, 0.2], [0.4, -0.3], 50)
+    nothing = np.zeros((count, 2))
+    recording = Recording("a", np.arange(50 + 2 * count), np.vstack([nothing, q, nothing]))
+    np.testing.assert_array_equal(recording.positions, q)
+    assert recording.times[0] == 0
+    said = [f"{count} frames at the {end} left out, which are all 0" for end in ("start", "end")]
+    assert [*recording.remarks] == said
+    through = np.linspace([0.0, 0.0], [0.4, -0.3], 50)
+    assert len(Recording("a", np.arange(51), np.vstack([nothing[:1], through])).times) == 51
+
+
 def test_ten_follows_nine():
     assert sorted(["d10", "d9", "d", "c11"], key=natural_order) == ["c11", "d", "d9", "d10"]
 

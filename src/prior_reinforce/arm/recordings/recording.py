@@ -119,10 +119,10 @@ class Recording:
                 f"{episode}: time is {times[bad[0]]} at frame {bad[0]}, expected a finite number; "
                 "mend or drop that episode"
             )
-        remarks, frames = self.remarks, _without_zeros(positions)
-        if frames < times.size:
-            remarks += (f"{times.size - frames} frames at the end left out, which are all 0",)
-            times, positions = times[:frames], positions[:frames]
+        remarks, (first, stop) = self.remarks, _without_zeros(positions)
+        for count, end in ((first, "start"), (times.size - stop, "end")):
+            remarks += (f"{count} frames at the {end} left out, which are all 0",) * (count > 0)
+        times, positions = times[first:stop], positions[first:stop]
         # A frame that repeats the one before, time and all; another at the same time is an error.
         same = (np.diff(times) == 0) & np.all(np.diff(positions, axis=0) == 0, axis=1)
         if np.any(same) and not np.all(same):
@@ -192,18 +192,22 @@ def recorded(
     return Recording(episode, clock.times, positions, names, **said)
 
 
-def _without_zeros(positions: Positions) -> int:
-    """Frames without those at the end that are all 0, if the motion does not get there.
+def _without_zeros(positions: Positions) -> tuple[int, int]:
+    """First frame and end of those without the outer ones that are all 0, if a motion leaps there.
 
-    Zeros fill up what is shorter than others. A motion leaps into them: at least two of its
-    channels, or its only one, at once and by more than in any frames before.
+    Zeros fill up what is shorter than others, and are read before a driver is up. A motion leaps
+    into them: at least two of its channels, or its only one, at once and by more than in any frames
+    between.
     """
-    count = int(np.max(np.flatnonzero(np.any(positions != 0, axis=1)), initial=-1)) + 1
-    if not 2 < count < len(positions) or not np.all(np.isfinite(positions)):
-        return len(positions)
-    steps = np.abs(np.diff(positions[:count], axis=0)).max(axis=0)
-    leaps = (steps > 0) & (np.abs(positions[count - 1]) > _LEAP * steps)
-    return count if np.sum(leaps) >= min(2, positions.shape[1]) else len(positions)
+    count = len(positions)
+    others = np.flatnonzero(np.any(positions != 0, axis=1))
+    if len(others) < 3 or not np.all(np.isfinite(positions)):
+        return 0, count
+    first, stop = int(others[0]), int(others[-1]) + 1
+    steps = np.abs(np.diff(positions[first:stop], axis=0)).max(axis=0)
+    leaps = (steps > 0) & (np.abs(positions[[first, stop - 1]]) > _LEAP * steps)
+    begins, ends = leaps.sum(axis=1) >= min(2, positions.shape[1])
+    return first if begins else 0, stop if ends else count
 
 
 def unread() -> Recording:
