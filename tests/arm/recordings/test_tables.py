@@ -129,6 +129,17 @@ def test_points_between_thousands_are_no_numbers(tmp_path):
     path.write_text("a;b\n1,5;1.234,5\n2,5;3,5\n")
     with pytest.raises(FileFormatError, match=r"line 2: b is '1\.234,5', expected a number"):
         one(path, decimal=",").numbers(1)
+    path.write_text("a;b\n1,5;1.234,5\n2,5;1.235,5\n")
+    with pytest.raises(FileFormatError, match=r"so are 2 of 2 rows: .*1000 for 1\.000,0"):
+        one(path, decimal=",").numbers(1)
+
+
+def test_milliseconds_behind_a_colon_are_times_and_frames_of_a_film_are_none(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("t,f\n09:59:59:990,09:59:59:24\n10:00:00:005,10:00:00:00\n")
+    table = one(path)
+    assert table.nanoseconds(0).tolist() == [0, 15_000_000]
+    assert table.nanoseconds(1) is None
 
 
 def test_dates_and_times_of_day(tmp_path):

@@ -38,7 +38,7 @@ _SAMPLE = 40
 _WESTERN = set("°µ²³äöüÄÖÜßàâçéèêëîïôùûñÀÉÈáíóúãõåæøÅÆØ")
 """Non-ASCII characters in tables that a Western Excel saves in its own code page."""
 _LIST = re.compile(r"\s*[\[({]\s*[-+.\deE]+([,\s]+[-+.\deE]+)+\s*[\])}]\s*")
-PLAIN = "write plain numbers, -0.6 for (0.6), 0.5 for '0.5 sec', and several as [0.1, 0.2]"
+PLAIN = "write plain numbers, -0.6 for (0.6), 1000 for 1.000,0, 0.5 for '0.5 sec', [1, 2] for two"
 """What to do about a column of numbers in other forms."""
 _DATE = re.compile(r"\d{4}-\d\d-\d\d|\d{1,2}:\d\d|\d{1,2}[/.]\d{1,2}[/.]\d{4}")
 _THOUSANDS = re.compile(
@@ -58,7 +58,9 @@ _OF_AN_OFFICE = re.compile(
 """`11/26/2026 1:05:09.3 PM`, `26.11.2026 13:05:09`: as office programs write them."""
 _MINUTES = re.compile(r"[0-5]\d:[0-5]\d[.,]\d+")
 """`00:57.010`, minutes and seconds."""
-_SPAN = re.compile(r"([+-]?)(?:(\d+) days? \+?)?(\d+):([0-5]\d):([0-5]\d)(?:[.,](\d{1,9})\d*)?")
+_SPAN = re.compile(
+    r"([+-]?)(?:(\d+) days? \+?)?(\d+):([0-5]\d):([0-5]\d)(?:(?:[.,]|:(?=\d{3}$))(\d{1,9})\d*)?"
+)
 _NAN = ("nan", "+nan", "-nan")
 _NONE = ("none", "null", "na", "n/a", "-", "inf", "-inf")
 _DAY = 86_400 * 10**9
