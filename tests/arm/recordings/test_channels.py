@@ -37,6 +37,31 @@ def test_places_and_joints_are_told_apart_by_what_x_and_y_are_of():
     assert Kind.MATRIX not in kinds(["q_00", "q_01", "q_10", "q_11"])
 
 
+@pytest.mark.parametrize(
+    "attitude", ["qx qy qz qw", "rx ry rz", "roll pitch yaw", "tool_qw tool_qx tool_qy tool_qz"]
+)
+@pytest.mark.parametrize(
+    "place", ["px py pz", "ee_px ee_py ee_pz", "PosX PosY PosZ", "x_tcp y_tcp z_tcp", "p_0 p_1 p_2"]
+)
+def test_three_numbers_beside_an_attitude_are_a_place(place, attitude):
+    own, other = place.split(), attitude.split()
+    joints = place[:2] == "p_" and attitude == "roll pitch yaw"  # as a wrist's are called
+    for names in (own + other, other + own, ["gripper", *own, *other, "joint1"]):
+        found = dict(zip(names, kinds(names), strict=True))
+        assert {found[name] for name in own} == {Kind.UNKNOWN if joints else Kind.PLACE}
+    assert Kind.PLACE not in kinds([*own, "dof", *other])
+    assert Kind.PLACE not in kinds(["J1", "J2", "J3", *other])
+
+
+def test_a_numbered_pose_is_a_place_and_an_attitude():
+    for pose, after in ((range(6), Kind.ROTATION), (range(1, 8), Kind.QUATERNION)):
+        one, two = ([f"{of}_TCP_pose_{i}" for i in pose] for of in ("actual", "target"))
+        each = (Kind.PLACE,) * 3 + (after,) * (len(pose) - 3)
+        assert kinds([*one, "q1", *two]) == (*each, Kind.ANGLE, *each)
+    assert {*kinds([f"pose_{i}" for i in range(5)])} == {Kind.UNKNOWN}
+    assert {*kinds([f"joint_pose_{i}" for i in range(6)])} == {Kind.ANGLE}
+
+
 def test_the_usual_unit_is_that_of_the_kind():
     assert [kind.usual_unit(3.0) for kind in (Kind.ANGLE, Kind.PLACE, Kind.MATRIX)] == [
         "rad", "m", "1",

@@ -142,6 +142,11 @@ def test_an_rtde_log_is_known_by_its_columns(tmp_path):
     np.testing.assert_allclose(recording.positions, q[:, :6], atol=1e-8)
     assert recording.period == pytest.approx(0.002)
     assert not recording.named  # six columns are any six joints, in order
+    rows = np.column_stack([t, q[:, :6], q[:, :6]])
+    names = [*names[:7], *(f"actual_TCP_pose_{i}" for i in range(6))]
+    pd.DataFrame(rows, columns=names).to_csv(tmp_path / "0.csv", index=False)
+    (pose,) = read_recordings(tmp_path, key="actual_TCP_pose")
+    assert pose.names == tuple(names[7:])  # a pose is that of no six joints
 
 
 def test_an_rtde_log_of_an_arm_at_rest_keeps_its_rows(tmp_path):

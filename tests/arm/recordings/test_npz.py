@@ -250,6 +250,13 @@ def test_three_numbers_of_a_place_are_called_by_their_key(tmp_path):
     assert read.names[:4] == ("eef_pos_x", "eef_pos_y", "eef_pos_z", "quat_0")
 
 
+def test_numbers_of_a_whole_pose_are_called_by_their_key(tmp_path):
+    t, q = sampled(0, 50)
+    np.savez(tmp_path / "a.npz", t=t, q=q, tcp_pose=q)
+    (read,) = read_recordings(tmp_path / "a.npz", key="tcp_pose")
+    assert read.names == tuple(f"tcp_pose_{i}" for i in range(7))
+
+
 def test_a_rate_that_the_file_says_is_that_of_frames_that_are_counted(tmp_path):
     q = sampled(0, 50)[1]
     np.savez(tmp_path / "a.npz", q=q, frame=np.arange(len(q)), fps=50)

@@ -10,8 +10,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from enum import Enum
+from itertools import takewhile
 
-from prior_reinforce.plans.whole_turns import CIRCLES, TURN, attitudes
+from prior_reinforce.plans.whole_turns import CIRCLES, TURN, attitudes, euler_angles
 from prior_reinforce.units import base_of
 
 
@@ -23,7 +24,7 @@ class Kind(Enum):
     ROTATION = "a part of a rotation vector, or of angles called like one: rx, ry, rz"
     QUATERNION = "a part of a quaternion: qx, qy, qz, qw"
     MATRIX = "an entry of a matrix: R11 to R33"
-    PLACE = "a coordinate: x, y, z, tool_x"
+    PLACE = "a coordinate: x, y, z, tool_x; px, py, pz beside an attitude"
     TOOL = "a gripper, or a sensor: a width, a share, a pressure"
     UNKNOWN = "a name that says nothing"
 
@@ -76,6 +77,12 @@ _OF_PLACE = re.compile(
 )
 """What x, y and z are the place of: `tool_x`. Others may be joints: `hip_x`, `hip_y`."""
 _ENTRY = re.compile(r"(?P<group>.*?)[_\[ ]*(?P<part>[0-4][,_]?[0-4])\]?")
+_POSE = re.compile(r"(?P<group>(.*[^a-z])?pose)[_.\[ ]*(?P<part>\d)\]?", re.IGNORECASE)
+_PARTS_OF_POSE = {
+    size: (Kind.PLACE,) * 3 + (attitude,) * (size - 3)
+    for size, attitude in ((6, Kind.ROTATION), (7, Kind.QUATERNION))
+}
+"""A whole pose that is numbered, by its size: `actual_TCP_pose_0` to `actual_TCP_pose_5`."""
 _OPENING = re.compile(
     r"(.*[^a-z])?(gripper|jaw|claw|finger)s?([ _./-]*(width|pos(ition)?|q(pos)?|opening|state|value"
     r"|joint\d*))*",
@@ -99,9 +106,19 @@ def kinds(names: Sequence[str]) -> tuple[Kind, ...]:
     """Return what each of a recording's channels is."""
     of_group = {name: Kind.PLACE for name in _grouped(names, _COORDINATE, _are_place)}
     of_group |= {name: Kind.MATRIX for name in _grouped(names, _ENTRY, _are_matrix)}
+    poses: dict[str, list[str]] = {}
+    for name in names:
+        match = _POSE.fullmatch(name.strip())
+        if match and _by_word(match["group"]) is not Kind.ANGLE:  # no `joint_pose_0`
+            poses.setdefault(match["group"], []).append(name)
+    for pose in poses.values():
+        of_group |= zip(sorted(pose), _PARTS_OF_POSE.get(len(pose), ()), strict=False)
     for group in attitudes(names):
         of_group |= dict.fromkeys(group, Kind.QUATERNION if len(group) == 4 else Kind.ROTATION)
-    return tuple(of_group.get(name) or _by_word(name) for name in names)
+    found = [of_group.get(name) or _by_word(name) for name in names]
+    for i in [*_place_beside_attitude(names, found)]:
+        found[i] = Kind.PLACE
+    return tuple(found)
 
 
 def one_for_all(
@@ -121,6 +138,21 @@ def one_for_all(
 def _by_word(name: str) -> Kind:
     spaced = re.sub("(?<=[a-z0-9])(?=[A-Z])", "_", name)  # `baseYaw` as `base_Yaw`
     return next((kind for pattern, kind in _BY_WORD if pattern.search(spaced)), Kind.UNKNOWN)
+
+
+def _place_beside_attitude(names: Sequence[str], found: Sequence[Kind]) -> Iterator[int]:
+    """Where three names, and not more, next to an attitude say nothing else: `px`, `x_tcp`, `p_0`.
+
+    Beside roll, pitch and yaw, which a wrist's joints are called too, they say x, y, z.
+    """
+    sure = attitudes(names)
+    for group in (*sure, *euler_angles(names, ("rad",) * len(names))):
+        at = [names.index(name) for name in group]
+        for beside in (range(min(at))[::-1], range(max(at) + 1, len(names))):
+            place = sorted(takewhile(lambda i: found[i] is Kind.UNKNOWN, beside))
+            says = all(letter in names[i].lower() for letter, i in zip("xyz", place, strict=False))
+            if len(place) == 3 and (says or group in sure):
+                yield from place
 
 
 def _grouped(

@@ -255,7 +255,8 @@ def _episode(
     if found and not options.key and {*found} <= {*others}:
         channels = found
     elif table.named and (keys := options.key or ((log.key,) if log else ())):
-        channels, named = _by_key(table, keys, others, options.joints or ()), False
+        channels = _by_key(table, keys, others, options.joints or ())
+        named = not options.joints and Kind.PLACE in kinds([names[i] for i in channels])
     remarks = [*said_of_all, *remark]
     if log is not None:
         remarks.append(f"{log.name}: time in {log.time_unit}, motion is {log.key} (measured)")

@@ -199,13 +199,13 @@ def _joined(
 
 
 def _coordinates(key: str, widths: Sequence[int]) -> list[str]:
-    """Names of the three numbers of a place, `tcp_x`; none where they may be joints.
+    """Names of the three numbers of a place, `tcp_x`, or a pose's; none where they may be joints.
 
     What is only called positions is a place beside the four numbers of an attitude.
     """
-    names = [f"{key}_{axis}" for axis in "xyz"]
+    names = [f"{key}_{one}" for one in ("xyz" if widths[0] == 3 else range(widths[0]))]
     bare = key.rpartition("/")[2].lower() in ("p", "pos", "position", "positions")
-    is_place = widths[0] == 3 and {*kinds(names)} == {Kind.PLACE} and (4 in widths or not bare)
+    is_place = Kind.PLACE in kinds(names) and (4 in widths or not bare)
     return names if is_place else []
 
 
