@@ -76,6 +76,15 @@ def test_a_number_of_frames_or_a_mask_says_what_is_padding(stated, kept):
     assert (found, len(said)) == (kept, int(kept < 101))
 
 
+def test_nan_to_the_end_of_every_joint_is_padding_and_within_is_not():
+    q = Q.copy()
+    q[80:] = np.nan
+    for one, kept in ((q, 80), (np.where(np.arange(101)[:, None] == 90, Q, q), 91)):
+        assert frames_said("a", "q", {"q": one}, 101)[0] == kept
+    q[80:, 0] = 0.1
+    assert frames_said("a", "q", {"q": q}, 101)[0] == 101
+
+
 def test_frames_beyond_the_number_that_move_are_no_padding():
     with pytest.raises(FileFormatError, match="declares 40 samples by length but q holds 101"):
         frames_said("a", "q", {"q": Q, "length": np.int64(40)}, 101)

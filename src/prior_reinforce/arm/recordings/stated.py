@@ -291,8 +291,8 @@ def frames_said(
 ) -> tuple[int, tuple[str, ...]]:
     """Return how many of the frames were recorded, the rest being padding, and a remark on it.
 
-    A number of frames says so, or a mask that is one thing for the first frames and another for the
-    rest. FileFormatError where frames beyond that number move.
+    A number of frames says so, a mask that is one thing for the first frames and another for the
+    rest, or a motion of nan from there on. FileFormatError where frames beyond that number move.
     """
     found, kept = "", count
     for name, value in stated.items():
@@ -307,7 +307,10 @@ def frames_said(
             rest = np.nan_to_num(np.asarray(stated[key], dtype=float)[n:])
             if 0 < n < count and np.any(np.diff(rest, axis=0)):
                 raise other_count(where, f"{n} samples by {name}", key, count)
+        elif name == key and numbers.dtype.kind == "f":
+            ends = np.isnan(numbers[::-1]).all(axis=tuple(range(1, numbers.ndim)))
+            n = count - int(np.argmin(np.append(ends, False)))
         if 1 < n < kept:
-            found, kept = name, n
+            found, kept = f"nan in {name}" if name == key else name, n
     remark = f"{count - kept} frames at the end left out, which are padding by {found}"
     return kept, (remark,) * (kept < count)
