@@ -108,6 +108,19 @@ def test_lerobot_whose_action_alone_has_names(tmp_path, joints):
     assert read_recordings(folder, joints=joints)[0].names == JOINTS[::-1]
 
 
+def test_features_of_one_joint_each_are_named(tmp_path):
+    folder = lerobot_set(tmp_path / "set", 30, [sampled(0, 30)[1]], [*JOINTS])
+    path = folder / "meta" / "info.json"
+    info = json.loads(path.read_text())
+    one = {"dtype": "float32", "shape": [1], "names": None}
+    own = {name: said for name, said in info["features"].items() if said["shape"] == [1]}
+    info["features"] = own | {"observation.pan.pos": one, "observation.lift.pos": one}
+    path.write_text(json.dumps(info))
+    there = r"\['observation.pan.pos', 'observation.lift.pos'\]: say which with --key"
+    with pytest.raises(FileFormatError, match=there):
+        read_recordings(folder)
+
+
 def test_lerobot_whose_state_is_a_place_says_where_the_joints_are(tmp_path):
     """As converters of Franka and UR write it: names of the state, none of the joints."""
     folder = tmp_path / "set"

@@ -56,16 +56,15 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         features = dict(info["features"])
         rate = float(info["fps"])
         widths = _widths(features)
-        vectors = [
-            n for n, w in widths.items() if w > 1 and features[n]["dtype"].startswith("float")
-        ]
+        floats = [n for n in widths if features[n]["dtype"].startswith("float") and n not in _OWN]
+        vectors = [name for name in floats if widths[name] > 1]
         usual = _MEASURED if _MEASURED in vectors else vectors[0] if len(vectors) == 1 else ""
         keys = options.key or (usual,)
         wrong = [key for key in keys if key not in features]
         if wrong:
             raise FileFormatError(
                 f"{source} has no feature {wrong[0] or _MEASURED}; features of numbers are "
-                f"{vectors}: say which with --key"
+                f"{vectors or floats}: say which with --key{', once a joint' * (not vectors)}"
             )
         key = keys[0]
         if not options.key:
