@@ -207,10 +207,11 @@ def _doubt_first(columns: Sequence[str], moving: Sequence[str]) -> tuple[Ambigui
     if others != [*columns] or zero not in moving:
         return ()
     what = (
-        f"{zero} moves beside {say_names(columns)}: if the recorder counts from 0, give --joints "
-        f"{shlex.join([zero, *columns[:-1]])}; or the names are the plan's, from 1"
+        f"{zero} moves beside {say_names(columns)}: it looks as if the recorder counts from 0; if "
+        f"the names are the plan's, from 1, give --joints {shlex.join(columns)}"
     )
-    return (Ambiguity(what, f"--joints {shlex.join(columns)}"),)
+    option = f"--joints {shlex.join([zero, *columns[:-1]])}"
+    return (Ambiguity(what, option, guessed=False),)
 
 
 def _holds(recording: Recording, joints: tuple[str, ...]) -> bool:
