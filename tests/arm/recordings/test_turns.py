@@ -104,6 +104,22 @@ def radians(course):
     ]
 
 
+@pytest.mark.parametrize("names", [["ax", "ay", "az"], [f"p[{i}]" for i in range(2, 6)]])
+def test_a_rotation_vector_whatever_its_name_changes_its_form_within(names):
+    """Also behind a place whose last number is small, as if it were the vector's first."""
+    true = [np.array([2.9, 0.4, 0.1]) + S[:, None] * [0.6, 0.2, 0.1] for _ in range(N)]
+    angle = [np.linalg.norm(motion, axis=1, keepdims=True) for motion in true]
+    own = [
+        np.where(a > np.pi, v * (1 - 2 * np.pi / a), v) for v, a in zip(true, angle, strict=True)
+    ]
+    assert max(np.abs(np.diff(motion, axis=0)).max() for motion in own) > 2
+    height = np.full((len(T), len(names) - 3), 0.02)
+    found, said = brought_together(names, None, [np.hstack([height, motion]) for motion in own])
+    assert "change their sign within the motion" in said
+    for motion, each in zip(found, true, strict=True):
+        np.testing.assert_allclose(motion, np.hstack([height, each]))
+
+
 @pytest.mark.parametrize("name", ["gripper_yaw", "Gripper Roll", "hand/gripper_rotation"])
 def test_how_a_gripper_is_turned_is_an_angle(name):
     true = radians(lambda i: 3.1 + 0.3 * S)

@@ -90,7 +90,7 @@ def aligned(
     form = replace(form, attitudes=tuple(kept))
     if before is not None:
         form = replace(before.format, dt=1.0)
-    for size, are in ((4, _are_quaternions), (3, _start_at_two_forms)):
+    for size, are in ((4, _are_quaternions), (3, _take_two_forms)):
         taken = {*form.periodic, *chain(*form.attitudes)}
         unnamed = _consecutive(form, motions, size, taken, are)
         form = replace(form, attitudes=(*form.attitudes, *unnamed))
@@ -142,15 +142,18 @@ def _consecutive(
     taken: set[str],
     are: Callable[[Sequence[np.ndarray], set[str]], bool],
 ) -> list[tuple[str, ...]]:
-    """Channels side by side, `pose_3` to `pose_6`, that `are` one attitude; none `taken` before."""
+    """Channels side by side, `pose_3` to `pose_6`, that `are` one attitude; none `taken` before.
+
+    The last first, as an attitude stands behind its place.
+    """
     found, taken = [], {*taken}
-    for first in range(len(form.names) - size + 1):
+    for first in reversed(range(len(form.names) - size + 1)):
         columns = slice(first, first + size)
         group, own = form.names[columns], [motion[:, columns] for motion in motions]
         if taken.isdisjoint(group) and are(own, {*form.units[columns]}):
             taken |= {*group}
             found.append(group)
-    return found
+    return found[::-1]
 
 
 def _check_length(group: Sequence[str], motions: Sequence[np.ndarray]) -> None:
@@ -174,17 +177,23 @@ def _are_quaternions(motions: Sequence[np.ndarray], units: set[str]) -> bool:
     return bool(units <= _OF_VECTORS and moves and _off_length_1(motions) < _SAME)
 
 
-def _start_at_two_forms(motions: Sequence[np.ndarray], units: set[str]) -> bool:
-    """Whether some motions start at one rotation vector, and the others at its other form.
+def _take_two_forms(motions: Sequence[np.ndarray], units: set[str]) -> bool:
+    """Whether rotation vectors go from one form to the other within a motion, or between starts."""
+    starts = np.array([motion[0] for motion in motions])
+    pairs = [(starts, starts[:1]), *((motion[1:], motion[:-1]) for motion in motions)]
+    return units <= _OF_VECTORS and any(_are_two_forms(*pair) for pair in pairs)
+
+
+def _are_two_forms(vectors: np.ndarray, others: np.ndarray) -> bool:
+    """Whether some vectors are near others only in their other form, and the rest as they are.
 
     Angles of their own, which lie apart though they are turned, are none.
     """
-    starts = np.array([motion[0] for motion in motions])
-    off, other = starts - starts[0], other_form(starts) - starts[0]
+    off, other = vectors - others, other_form(vectors) - others
     turned = off - TURN["rad"] * np.round(off / TURN["rad"])
     near, far, turned = (np.linalg.norm(each, axis=1) for each in (off, other, turned))
     some = np.any((near > 1) & (far < np.minimum(_NEXT, turned / 2)))
-    return bool(units <= _OF_VECTORS and some and np.all(np.minimum(near, far) < 1))
+    return bool(some and np.all(np.minimum(near, far) < 1))
 
 
 def _flip(motions: Sequence[np.ndarray], units: set[str]) -> bool:
