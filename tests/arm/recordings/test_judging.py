@@ -18,6 +18,7 @@ from tests.arm.recordings.recorded import takes
         (("j1", "j2", "j3", "robotiq_pos"), (0.4, -1.6, 1.2, 220), "rad rad rad UNIT"),
         (("j1", "j2", "j3", "gripper_yaw"), (0.4, -1.6, 1.2, 70), "rad rad rad deg"),
         (("wrist_flex", "index_finger_mcp"), (20, 75), "deg"),
+        (("x", "y", "z", "r"), (210, 90, 60, 40), "mm mm mm deg"),
     ],
 )
 def test_each_channel_is_asked_about_by_its_name_and_numbers(names, end, option):
@@ -41,6 +42,13 @@ def test_an_axis_that_may_slide_is_not_taken_in_degrees_with_the_joints():
         select(takes(("A1", "A2", "E1"), (40, -90, 700)), units=["deg", "deg", "UNIT"])
     each = select(takes(("A1", "A2", "E1"), (40, -90, 700)), units=["deg", "deg", "mm"])
     assert (each.units, each.ambiguities) == (("rad", "rad", "m"), ())
+
+
+def test_lengths_of_a_robot_are_in_mm_where_they_are_not_in_m():
+    some = takes(("rail", "lift", "gripper"), (280, 60, 25))
+    found = select(some, some[0].names, some[0].names, plan_units=("m",) * 3)
+    assert {one.option for one in found.ambiguities} == {"--units mm"}
+    assert select(some, units=["cm"], plan_units=("m",) * 3).ambiguities == ()
 
 
 def test_more_than_a_hundred_percent_is_refused_with_both_numbers():

@@ -153,7 +153,8 @@ class Judge:
     def _looks(self, one: Belief) -> str | None:
         """The unit that a channel's numbers look like."""
         most = max(each.largest for each in (self.places if one in self.places else [one]))
-        return judge_unit(one.unit, most, opening=one.kind is Kind.TOOL)
+        looks = judge_unit(one.unit, most, opening=one.kind is Kind.TOOL)
+        return "mm" if looks == "cm" != one.unit else looks  # cm are people's; machines log mm
 
     def _may_slide(self, one: Belief) -> Doubt | None:
         """A rail or an external axis is not in degrees only for being among angles that are."""
