@@ -14,7 +14,7 @@ from prior_reinforce.arm.recordings.channels import Kind, kinds, one_for_all
         ),
         (Kind.ANGLE, "gripper_yaw Gripper/Roll index_finger_mcp linear_angle"),
         (Kind.TOOL, "gripper finger_joint1 robotiq_pos pressure 夹爪 linear_gripper Greiferweite"),
-        (Kind.SLIDE, "E1 rail ext_axis_1 linearAxis slider prismatic_joint"),
+        (Kind.SLIDE, "E1 d3 rail ext_axis_1 linearAxis slider prismatic_joint"),
         (Kind.UNKNOWN, "foo magnet crank spring x z"),
         (Kind.PLACE, "tool.x tool.y"),
         (Kind.PLACE, "X_axis Y_axis Z_axis"),

@@ -18,6 +18,8 @@ from tests.arm.recordings.recorded import takes
         (("j1", "j2", "j3", "robotiq_pos"), (0.4, -1.6, 1.2, 220), "rad rad rad UNIT"),
         (("j1", "j2", "j3", "gripper_yaw"), (0.4, -1.6, 1.2, 70), "rad rad rad deg"),
         (("wrist_flex", "index_finger_mcp"), (20, 75), "deg"),
+        (("J1", "J2", "J3", "J4"), (28, -46, 120, 86), "deg deg UNIT deg"),
+        (("theta1", "theta2", "d3", "theta4"), (28, -46, 120, 86), "deg deg UNIT deg"),
         (("x", "y", "z", "r"), (210, 90, 60, 40), "mm mm mm deg"),
     ],
 )
@@ -44,11 +46,29 @@ def test_an_axis_that_may_slide_is_not_taken_in_degrees_with_the_joints():
     assert (each.units, each.ambiguities) == (("rad", "rad", "m"), ())
 
 
+def test_the_third_joint_of_four_is_no_slide_in_radians_or_if_its_unit_is_given():
+    some = takes(("J1", "J2", "J3", "J4"), (0.4, -1.6, 1.2, 1))
+    assert select(some, units=["rad"]).ambiguities == select(some).ambiguities == ()
+    some = takes(("J1", "J2", "J3", "J4"), (28, -46, 120, 86))
+    (asked,) = select(some, units=["deg"]).ambiguities
+    assert asked.option == "--units deg deg UNIT deg"
+    assert select(some, units=["deg", "deg", "mm", "deg"]).ambiguities == ()
+
+
 def test_lengths_of_a_robot_are_in_mm_where_they_are_not_in_m():
     some = takes(("rail", "lift", "gripper"), (280, 60, 25))
     found = select(some, some[0].names, some[0].names, plan_units=("m",) * 3)
     assert {one.option for one in found.ambiguities} == {"--units mm"}
     assert select(some, units=["cm"], plan_units=("m",) * 3).ambiguities == ()
+
+
+def test_a_joint_that_is_in_radians_beside_others_in_degrees_is_named():
+    names = tuple(f"joint{i}" for i in range(1, 5))
+    found = select(takes((*names, "joint5"), (40, -90, 120, 30, 0.8)), units=["deg"])
+    (said,) = found.remarks
+    assert "joint5 of t0 reaches 0.8 deg" in said
+    assert said.endswith("--units deg deg deg deg rad")
+    assert select(takes((*names, "joint5"), (40, -90, 120, 30, 0.01)), units=["deg"]).remarks == ()
 
 
 def test_more_than_a_hundred_percent_is_refused_with_both_numbers():

@@ -20,7 +20,7 @@ class Kind(Enum):
     """What a channel is; in no unit that its kind cannot have, unless that is stated."""
 
     ANGLE = "an angle: joint3, base_yaw, gripper_roll, index_finger_mcp"
-    SLIDE = "an axis that turns or slides: a rail, E1"
+    SLIDE = "an axis that turns or slides: a rail, E1, a SCARA's d3"
     ROTATION = "a part of a rotation vector, or of angles called like one: rx, ry, rz"
     QUATERNION = "a part of a quaternion: qx, qy, qz, qw"
     MATRIX = "an entry of a matrix: R11 to R33"
@@ -54,7 +54,9 @@ _TOOL = (
     r"grip|jaw|finger|width|claw|opening|suction|robotiq|wsg|greifer|pince|夹爪|夹具|vacuum|valve"
     r"|pressure|force|torque|voltage|temperature"
 )
-_SLIDE = r"e\d|ext(ernal)?([_ ]?axis)?[_ ]?\d*|rail|track|linear|slider?|gantry|prismatic|carriage"
+_SLIDE = (
+    r"[de]\d|ext(ernal)?([_ ]?axis)?[_ ]?\d*|rail|track|linear|slider?|gantry|prismatic|carriage"
+)
 
 
 def _word(words: str) -> str:

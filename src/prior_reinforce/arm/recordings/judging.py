@@ -29,8 +29,8 @@ Given = Literal["", "one for all", "each"]
 """How --units gives the recorded units; empty where it does not."""
 _MOST_PERCENT = 110.0
 """Percent of a range; ours: calibrations overshoot by a few."""
-_HARDLY_DEG = 2.0
-"""Degrees within which a recorded arm hardly moves. Ours."""
+_HARDLY_DEG, _STILL_DEG = 2.0, 0.1
+"""Degrees within which a recorded arm hardly moves, and within which a joint is still. Ours."""
 _OF_COUNTS = " ('0.088 deg' for 4096 counts a turn, their middle subtracted in the file)"
 _NOT_DONE, _HARDLY = "which no arm does", "which is hardly a motion"
 _NORMALISED = (
@@ -139,10 +139,22 @@ class Judge:
             return far
         if far and (together or near > TURN["rad"]):
             return self.angles
-        groups = vectors([one.name for one in self.beliefs]).values()
-        numbered = [{self.beliefs[i] for i in group} for group in groups]
-        alike = {one for group in numbered if not group.isdisjoint(far) for one in group}
+        numbered = [group for group in self._numbered if not {*far}.isdisjoint(group)]
+        alike = {one for group in numbered for one in group}
         return [one for one in self.angles if one in far or one in alike]
+
+    @cached_property
+    def _numbered(self) -> list[list[Belief]]:
+        """Groups of channels that are numbered alike."""
+        groups = vectors([one.name for one in self.beliefs]).values()
+        return [[self.beliefs[i] for i in group] for group in groups]
+
+    @cached_property
+    def _slides(self) -> list[Belief]:
+        """Channels that may slide: by their names, and in degrees the third joint of four."""
+        arms = [arm for arm in self._numbered if [a.kind for a in arm] == [Kind.ANGLE] * 4]
+        scara = [arm[2] for arm in arms if arm[2] in self.far or arm[2].stated == "deg"]
+        return [one for one in self.beliefs if one.kind is Kind.SLIDE] + scara
 
     def _counts_turns(self, far: Sequence[Belief]) -> bool:
         """Whether one joint of the robot is beyond a turn, and in degrees others hardly move."""
@@ -157,11 +169,11 @@ class Judge:
         return "mm" if looks == "cm" != one.unit else looks  # cm are people's; machines log mm
 
     def _may_slide(self, one: Belief) -> Doubt | None:
-        """A rail or an external axis is not in degrees only for being among angles that are."""
+        """A rail or a SCARA's third axis is not in degrees only for being among angles that are."""
         among = one in self.far
         if self.given:
             among = self.given == "one for all" and self.silent
-        slides = one.kind is Kind.SLIDE and one.unit in TURN and one.largest > 0
+        slides = one in self._slides and one.unit in TURN and one.largest > 0
         why = "and its name leaves open if it turns or slides"
         return Doubt(UNIT, why, asked=True) if slides and among and not self.fixed else None
 
@@ -176,11 +188,13 @@ class Judge:
         return Doubt("percent" if one.largest <= 100 else UNIT, f"and {why} it is no angle")
 
     def _hardly_moves(self, one: Belief) -> Doubt | None:
-        """Joints that are all said to be in degrees, and stay within a few of them, are not."""
+        """Joints that are said to be in degrees are not where all stay, or one does, within few."""
         said = self.given == "one for all" and self.silent
         most = TURN["rad"] if said else TURN["rad"] / 2 * (not self.places)
         small = all(angle.stated == "deg" and angle.largest < most for angle in self.angles)
-        return Doubt("rad", _HARDLY, asked=said) if small and one in self.angles else None
+        alone = said and one.stated == "deg" and _STILL_DEG < one.largest < _HARDLY_DEG
+        doubted = (small or alone) and one in self.angles
+        return Doubt("rad", _HARDLY, asked=said and small) if doubted else None
 
     def _is_beyond(self, one: Belief) -> Doubt | None:
         """A number beyond what arms do is in another unit; an angle with those that share it."""
@@ -246,7 +260,7 @@ class Judge:
     def questions(self) -> list[Ambiguity]:
         """Ask about units, one question for what looks alike, all with one option."""
         units = list(self._answers.values())
-        option = f"--units {shlex.join(units if len({*units}) > 1 else units[:1])}"
+        option = _option(units)
         by = ", as --units says," if self.given else ""
         questions = []
         for unit, doubt, among, worst in self._groups(asked=True):
@@ -254,7 +268,7 @@ class Judge:
             if doubt.looks == UNIT:
                 seen = f"put its unit in the place of {UNIT}"
                 seen += " ('0.1 percent' if its range is 0 to 1000)" * (unit == "percent")
-                seen += _OF_COUNTS * (unit in TURN)
+                seen += _OF_COUNTS * (unit in TURN and worst not in self._slides)
             elif doubt.looks == "deg" and self.normalised and worst.largest <= 100:
                 seen += _NORMALISED
             what = (
@@ -267,9 +281,10 @@ class Judge:
     def remarks(self) -> tuple[list[str], str]:
         """Remark on doubtful units that somebody stated; with the option for another, if any."""
         remarks, other = [], ""
-        for unit, (looks, why, _), _, worst in self._groups(asked=False):
+        for unit, (looks, why, _), among, worst in self._groups(asked=False):
             if looks != UNIT:
-                other = f"--units {shlex.quote(looks)}" if self._one_option else ""
+                units = [looks if one in among else one.unit for one in self.beliefs]
+                other = _option(units) if self._one_option else ""
                 said = f"if it was recorded in {looks}, say {other}" if other else "check its unit"
                 why = f"{why} (in {looks} it is one)" if why == _HARDLY else "and arms do not"
                 remarks.append(f"{worst.where} reaches {worst.largest:.4g} {unit}, {why}: {said}")
@@ -278,3 +293,8 @@ class Judge:
         if self.given and degrees and shares and not self.questions():
             remarks.append(f"degrees, as --units says{_NORMALISED}")
         return remarks, other
+
+
+def _option(units: list[str]) -> str:
+    """Return the option that gives the channels' units: one for all where they are the same."""
+    return f"--units {shlex.join(units if len({*units}) > 1 else units[:1])}"
