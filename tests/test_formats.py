@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.formats import OutcomeFormat, in_tolerances
+from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError
+from prior_reinforce.formats import OutcomeFormat, as_bare_error, in_tolerances
 
 MIXED = OutcomeFormat(("x", "t"), ("m", "s"))
 
@@ -54,3 +54,9 @@ def test_a_format_that_cannot_be_is_refused(names, units, tolerance, message):
 
 def test_a_hit_is_one_tolerance_away_at_most():
     assert in_tolerances([0.009, 0.016], [0.015, 0.02]) == pytest.approx(1.0)
+
+
+def test_what_an_adapter_expects_without_a_number_excuses_no_error():
+    form = OutcomeFormat(("x", "y"), ("m", "m"), (0.015, 0.015))
+    with pytest.raises(InvalidFeedbackError, match="looks like centimetres"):
+        as_bare_error([20.0, 15.0], np.array([0.9, 0.1]), form, expected=[np.nan, np.nan])

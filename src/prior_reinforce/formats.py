@@ -177,7 +177,7 @@ def as_bare_error(
     array = as_error(told, form.outcome_dim)
     error, other = (array - goal, array) if landed else (array, array - goal)
     far, otherwise = (in_tolerances(e, form.tolerance or 1.0) for e in (error, other))
-    doubted = np.abs(error) > expected
+    doubted = ~(np.abs(error) <= expected)  # of what nobody expects, nan, all is
     if form.tolerance and far >= max(_FAR, 4 * otherwise) and doubted.any():
         kinds = ("an error (outcome minus goal)", "where the object ended")
         asked, mistaken = kinds[::-1] if landed else kinds

@@ -619,6 +619,17 @@ def test_what_is_wrong_in_every_file_leaves_none_out(tmp_path):
         read_recordings(tmp_path, joints=["elbow"])
 
 
+def test_rows_of_no_episode_do_not_make_its_neighbours_a_session(tmp_path):
+    rows = [
+        f"{k / 10},{n if k >= 10 else ''},{1 + n / 10},{np.sin(k / 4 + n)}"
+        for n in (1, 2, 3)
+        for k in range(30)
+    ]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["t,episode,target_x,joint1", *rows]))
+    assert [len(each.positions) for each in read_recordings(path, joints=["joint1"])] == [20] * 3
+
+
 def test_numbers_of_episodes_that_begin_anew_with_a_session_are_refused(tmp_path):
     rows = [
         f"{k / 10},{s},{n},{np.sin(k / 4 + n)}" for s in (1, 2) for n in (1, 2) for k in range(20)

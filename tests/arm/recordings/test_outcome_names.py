@@ -150,6 +150,13 @@ def test_the_column_of_the_recordings_exact_names_decides(tmp_path, cell):
     assert told(tmp_path, "trial,episode", "1,3 2,2 3,1 4,0", [*"0123"]) == [3, 2, 1, 0]
 
 
+def test_names_of_other_recordings_beside_numbers_are_no_silent_answer(tmp_path):
+    with pytest.raises(InvalidDemonstrationsError, match=r"in episode and in pair .* call it note"):
+        told(tmp_path, "episode,pair", "1,throw_2 2,throw_1 3,throw_4 4,throw_3", THROWS)
+    some = "1,none 2,throw_1 3,throw_2 4,throw_3"
+    assert told(tmp_path, "episode,after", some, THROWS) == [0, 1, 2, 3]
+
+
 def test_columns_that_tell_rows_apart_together_are_both_in_the_recordings_names(tmp_path):
     rows, names = "1,1 1,2 2,1 2,2", [f"run{i}_throw{j}" for j in (1, 2) for i in (1, 2)]
     assert told(tmp_path, "run,throw", rows, names) == [0, 2, 1, 3]
@@ -198,3 +205,6 @@ def test_columns_that_are_no_outcomes_by_their_names_are_left_out(tmp_path):
     beside = ["goal_x", "goal_y", "x_release", "y_release", "x_err", "y_err", "z", "speed", "x_cam"]
     assert other_places(tmp_path, ["x", "y"], beside) == beside[:6]
     assert other_places(tmp_path, [], beside) == []
+    others = ["velocity_x", "velocity_y", "x_px", "y_px"]
+    assert other_places(tmp_path, ["x", "y"], others) == others
+    assert other_places(tmp_path, ["angle"], ["elbow_angle"]) == ["elbow_angle"]

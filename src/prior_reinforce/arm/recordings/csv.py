@@ -195,6 +195,8 @@ def _changes(cells: Sequence[str]) -> list[int]:
 
 def _refuse_labels_again(table: Table, column: int) -> None:
     """FileFormatError if labels of episodes come again where another column changes: a session."""
+    of_throws = [row for row, label in enumerate(table.cells[column]) if label]
+    table = table.rows(of_throws)
     own, changes = table.cells[column], _changes(table.cells[column])
     if len({*own}) == len(changes):
         return

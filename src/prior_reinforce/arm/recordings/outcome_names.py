@@ -46,6 +46,11 @@ _NO_OUTCOMES = {
 }
 _NO_OUTCOMES |= {"command", "commanded", "cmd", "release", "released", "start", "initial", "begin"}
 """Words in the names of places that are not where the object landed."""
+_OUTCOMES = {"landing", "landed", "land", "actual", "measured", "meas", "hit", "impact", "outcome"}
+_OUTCOMES |= {"end", "final", "result", "rest", "stop", "stopped", "seen", "true", "real"}
+"""Words in the names of places that may be where it landed."""
+_FILES = {"file", "filename", "path", "recording", "video", "bag", "log"}
+"""Names of columns that say the file of a recording."""
 _WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 FILE = re.compile(
     r"(?:.*[/\\])?([^/\\]+)\.(?:csv|tsv|txt|npz|npy|hdf5|h5|bag|mcap|db3|zarr|mp4|avi|jpe?g|png)",
@@ -149,7 +154,8 @@ def order_of(cells: Sequence[str]) -> list[int]:
     numbers = [digits_at_end(cell) for cell in cells]
     if not all(numbers) or len({*numbers}) < len(numbers):
         return [*range(len(cells))]
-    return [sorted(map(int, numbers)).index(int(number)) for number in numbers]
+    order = {number: place for place, number in enumerate(sorted(map(int, numbers)))}
+    return [order[int(number)] for number in numbers]
 
 
 def rows_of(episodes: Sequence[str], word: str, cells: Sequence[str]) -> dict[str, int]:
@@ -180,18 +186,23 @@ def telling_column(
 
 
 def _telling_columns(keys: Sequence[Key], there: Sequence[str], where: str) -> Sequence[Key]:
-    """The columns that hold most of the recordings' exact names, else those called so.
+    """The files of recordings, else the columns called so and others of exact names alone.
 
     Where each repeats itself, that is one of the names of recordings numbered by all.
     InvalidDemonstrationsError if there are none.
     """
-    exact = [len({*cells}.intersection(there)) for _, cells in keys]
     named = [key for i, key in enumerate(keys) if i == 0 or key[0] in ROW_COLUMNS]
     alone = [key for key in named if len({*key[1]}) == len(key[1])]
-    if max(exact) and (alone or keys[exact.index(max(exact))] not in named):
-        return [key for key, number in zip(keys, exact, strict=True) if number == max(exact)]
-    if alone or len(named) < 2:
-        return alone or named
+    exact = [len({*cells}.intersection(there)) for _, cells in keys]
+    every = [
+        key
+        for key, number in zip(keys, exact, strict=True)
+        if number in (len(key[1]), len(there)) and len({*key[1]}) == len(key[1])
+    ]
+    if files := [key for key in every if key in named or key[0] in _FILES]:
+        return files
+    if alone or every or len(named) < 2:
+        return [*alone, *every] or named
     words = [head.split("_")[0] for head, _ in named]
     of = defaultdict[tuple[str | None, ...], list[str]](list)
     for name in there:
@@ -251,9 +262,9 @@ def columns_of(names: Sequence[str], there: Sequence[str]) -> dict[str, list[tup
 
 
 def other_places(path: Path, names: Collection[str], beside: Sequence[str]) -> list[str]:
-    """Return columns that are no outcomes by their names, `goal_x` and `goal_y` beside `x` and `y`.
+    """Return columns that are of other places, `goal_x` and `goal_y` beside `x` and `y`.
 
-    FileFormatError if others, as `landing_x` and `landing_y`, may be the outcomes as well.
+    FileFormatError if they may be the outcomes as well, as `landing_x` and `landing_y`.
     """
     sets = defaultdict[tuple[str, ...], dict[str, str]](dict)
     for name in beside:
@@ -265,7 +276,8 @@ def other_places(path: Path, names: Collection[str], beside: Sequence[str]) -> l
         if not rest or not all(columns_of([*names], [*found]).values()):
             continue
         others = list(found.values())
-        if not _NO_OUTCOMES.intersection(rest) and not all(map(_ERRORS.fullmatch, others)):
+        known = _NO_OUTCOMES.intersection(rest) or all(map(_ERRORS.fullmatch, others))
+        if not known and any(word in _OUTCOMES or word.isdigit() for word in rest):
             own = ", ".join(names)
             raise FileFormatError(
                 f"{path} has {', '.join(others)} beside {own}: call where the object landed {own}, "

@@ -132,14 +132,14 @@ def _shared_unit(
     unsaid = [j for j in lengths if outcomes.units[j] is None]
     sizes, said = units_of("length"), [j for j in lengths if outcomes.units[j] == "m"]
     units = {unit for unit, size in sizes.items() if size in scale[said]}
-    if not unsaid or len(units) != 1 or units == {wanted[unsaid[0]]}:
+    far = float(np.nanmax(np.abs(outcomes.values[:, unsaid]), initial=0.0))
+    if not far or len(units) != 1 or units == {wanted[unsaid[0]]}:
         return outcomes, ()
     (unit,), plain = units, wanted[unsaid[0]]
-    far = float(np.nanmax(np.abs(outcomes.values[:, unsaid]), initial=0.0))
     own, other = (" and ".join(outcomes.names[j] for j in each) for each in (unsaid, said))
     asked = Ambiguity(
         f"in {outcomes.where}, {own} (up to {far:.4g}) has no unit beside {other} in {unit}: it "
-        f"looks like {unit} as well (if it is in {plain}: --outcome-unit {plain})",
+        f"may be {unit} as well (if it is in {plain}: --outcome-unit {plain})",
         f"--outcome-unit {unit}",
         guessed=judge_unit(plain, far) != plain,
     )
