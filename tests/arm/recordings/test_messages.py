@@ -108,8 +108,9 @@ def test_a_joint_without_positions_is_refused_by_name():
         read(told(ARM, at(100)), empty)
 
 
-def test_header_stamps_of_clocks_that_differ_are_asked_about():
-    topics = told(ARM, at(100)), told(GRIPPER, at(50), clock=30.0)
+@pytest.mark.parametrize("clock", [30.0, 0.6, 0.3, -0.3])
+def test_header_stamps_of_clocks_that_differ_are_asked_about(clock):
+    topics = told(ARM, at(100)), told(GRIPPER, at(50), clock=clock)
     with pytest.raises(FileFormatError, match=r"gripper .*--time-column header, or recorder"):
         read(*topics)
     check(read(*topics, time_column="recorder"))

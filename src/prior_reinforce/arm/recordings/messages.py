@@ -27,8 +27,9 @@ _HEADER, _RECORDER = _CLOCKS
 _JUMP, _DRIFT = 1e8, 0.05
 """By how much the two clocks of a bag may part within a message, in [ns], and drift apart as a
 share. Ours: queues hold messages for some 10 ms."""
-_LATE = 1e9
-"""By how much longer a joint's messages may be on their way than others, in [ns]. Ours."""
+_LATE = 2e8
+"""By how much longer a joint's messages may be on their way than others, in [ns]. Ours: more than
+queues hold them, less than clocks nobody synchronised mostly differ by."""
 _MOVES, _LEAP, _OFTEN = 0.02, 0.5, 0.05
 """Range in [rad] or [m] that is a motion; part of it that is a leap; share of frames in which no
 joint leaps, but two publishers do in turn. Ours."""
@@ -197,9 +198,9 @@ def _refuse_late(bag: Path, joint: str, messages: list[Message], frames: list[Me
     own, other = (np.median([m.came - m.sent for m in each]) for each in (messages, frames))
     if abs(own - other) > _LATE:
         raise FileFormatError(
-            f"{bag}: by header stamps {joint} is on its way {(own - other) * 1e-9:.3g} s longer "
-            f"than other joints; say which stamps are right: --time-column {_HEADER}, or "
-            f"{_RECORDER}"
+            f"{bag}: by header stamps {joint} is on its way {abs(own - other) * 1e-9:.3g} s "
+            f"{'longer' if own > other else 'less'} than other joints, as where clocks differ; "
+            f"say which stamps are right: --time-column {_HEADER}, or {_RECORDER}"
         )
 
 
