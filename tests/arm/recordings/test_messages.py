@@ -116,6 +116,53 @@ def test_header_stamps_of_clocks_that_differ_are_asked_about(clock):
     check(read(*topics, time_column="recorder"))
 
 
+def of_another(messages, value):
+    """The same messages of another publisher, who says one value."""
+    for m in messages:
+        m.content.position = np.full(len(m.content.name), value)
+    return [m._replace(publisher=7) for m in messages]
+
+
+@pytest.mark.parametrize("same_topic", [True, False])
+@pytest.mark.parametrize("moves", [True, False])
+def test_two_publishers_of_a_gripper_are_told_apart(same_topic, moves):
+    arm, gripper = told(ARM, at(100)), told(GRIPPER, at(50))
+    other = of_another(told(GRIPPER, at(50) + 0.005), 0.0)
+    if moves:
+        for i, m in enumerate(other):
+            m.content.position = m.content.position + 0.001 * i
+    both = sorted(gripper + other, key=lambda m: m.came)
+    topics = [sorted(arm + both, key=lambda m: m.came)] if same_topic else [arm, both]
+    if moves:
+        with pytest.raises(FileFormatError, match=r"several publishers .*; record one of them al"):
+            read(*topics)
+        return
+    recording = read(*topics)
+    check(recording)
+    assert any(f"{len(other)} messages of another" in remark for remark in recording.remarks)
+
+
+def test_two_publishers_of_a_gripper_in_one_connection_are_asked_about():
+    other = [m._replace(publisher=0) for m in of_another(told(GRIPPER, at(50) + 0.005), 0.0)]
+    both = sorted(told(GRIPPER, at(50)) + other, key=lambda m: m.came)
+    with pytest.raises(FileFormatError, match=r"several publishers .*; record one of them al"):
+        read(told(ARM, at(100)), both)
+
+
+def test_two_publishers_that_agree_on_a_held_gripper_are_joined():
+    held = of_another(told(GRIPPER, at(50)), 0.04)
+    both = [*held, *(m._replace(publisher=8, came=m.came + 1000) for m in held)]
+    recording = read(told(ARM, at(100)), sorted(both, key=lambda m: m.came))
+    np.testing.assert_allclose(recording.positions[:, 2], 0.04)
+
+
+def test_a_gripper_told_seldom_that_closes_and_opens_is_of_one_publisher():
+    gripper = told(GRIPPER, at(10))
+    for m, value in zip(gripper, np.repeat([0.0, 1.0, 0.0], [4, 12, 4]), strict=True):
+        m.content.position = np.array([value])
+    assert np.ptp(read(told(ARM, at(100)), gripper).positions[:, 2]) == 1.0
+
+
 def test_a_joint_that_no_topic_holds_is_named_beside_those_there():
     with pytest.raises(FileFormatError, match=r"holds gripper; .* shoulder, elbow: name those"):
         read(told(ARM, at(100)))

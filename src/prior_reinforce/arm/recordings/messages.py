@@ -33,6 +33,10 @@ queues hold them, less than clocks nobody synchronised mostly differ by."""
 _MOVES, _LEAP, _OFTEN = 0.02, 0.5, 0.05
 """Range in [rad] or [m] that is a motion; part of it that is a leap; share of frames in which no
 joint leaps, but two publishers do in turn. Ours."""
+_ONCE = 2
+"""Leaps there and back that a gripper told seldom may make, as it closes and opens. Ours."""
+_HELD = 1e-3
+"""Range in [rad] or [m] of a joint that is held, so that no rate tells more of it. Ours."""
 _DETOUR = 0.01
 """Part of their ranges that joints go further, at least, when sorted by a clock that was set back.
 Ours."""
@@ -101,9 +105,7 @@ def read_messages(
     positions, motion = _positions(kept, names), _positions(kept, most)
     inside = np.ones(len(kept), dtype=bool)
     joined: dict[str, list[str]] = {}
-    for joint in (joint for joint in owner if joint not in names):
-        series = [m for m in topics[owner[joint]] if joint in m.content.name]
-        series = [m for m in series if len(m.content.position)]
+    for joint, series in _series_beside(bag, topics, owner, names, wanted, remarks):
         by = clock if all(m.sent > 0 for m in series) else _RECORDER
         if joint in wanted and series and by == _HEADER != options.time_column:
             _refuse_late(bag, joint, series, kept)
@@ -167,6 +169,34 @@ def _wanted(
     return tuple(every[i] for i in found)
 
 
+def _series_beside(
+    bag: Path,
+    topics: Sequence[list[Message]],
+    owner: Mapping[str, int],
+    names: Sequence[str],
+    wanted: Sequence[str],
+    remarks: list[str],
+) -> list[tuple[str, list[Message]]]:
+    """Every joint beside `names` with the messages that tell it; of wanted ones, of one publisher.
+
+    What is said of other publishers is added to the remarks.
+    """
+    together: dict[tuple[int, ...], list[str]] = {}  # joints by topic and index of its messages
+    for joint in (joint for joint in owner if joint not in names):
+        messages = enumerate(topics[owner[joint]])
+        which = (i for i, m in messages if joint in m.content.name and len(m.content.position))
+        together.setdefault((owner[joint], *which), []).append(joint)
+    each = []
+    for (topic, *which), joints in together.items():
+        series = [topics[topic][i] for i in which]
+        asked = [joint for joint in joints if joint in wanted]
+        if series and asked:
+            series, said = _of_one_publisher(bag, series, asked)
+            remarks += said
+        each += [(joint, series) for joint in joints]
+    return each
+
+
 def _series(
     frames: list[Message], messages: list[Message], joint: str, clock: str
 ) -> tuple[Times, np.ndarray, np.ndarray]:
@@ -228,6 +258,8 @@ def _of_one_publisher(
         each = [
             own for own in groups.values() if np.ptp(_positions(own, wanted), axis=0).max() > _MOVES
         ]
+        if not each and np.ptp(_positions(messages, wanted), axis=0).max() <= _HELD:
+            each = [messages]
     if len(each) != 1 or _leaps(each[0], wanted):
         counts = " and ".join(str(len(own)) for own in groups.values())
         raise FileFormatError(
@@ -252,8 +284,8 @@ def _steps(positions: Positions) -> np.ndarray:
 def _leaps(messages: list[Message], joints: Sequence[str]) -> bool:
     """Whether a joint leaps time and again, as two publishers in turn make it do."""
     steps = _steps(_positions(messages, joints))
-    there, back = (np.mean(sign * steps > _LEAP, axis=0) for sign in (1, -1))
-    return bool(np.any(np.minimum(there, back) > _OFTEN))
+    there, back = (np.sum(sign * steps > _LEAP, axis=0) for sign in (1, -1))
+    return bool(np.any(np.minimum(there, back) > max(_ONCE, _OFTEN * len(steps))))
 
 
 def _by_clock(
