@@ -91,13 +91,35 @@ def test_messages_without_stamps_are_joined_by_the_recorders_and_it_is_said():
 
 
 @pytest.mark.parametrize(
-    "times", [at(4), at(100, end=0.8), at(100, start=1.2), [0.5], [*at(50, end=0.8), *at(50, 1.2)]]
+    "times", [at(4), at(100, end=0.8), at(100, start=1.2), [*at(50, end=0.8), *at(50, 1.2)]]
 )
 def test_a_joint_that_is_told_too_seldom_is_refused_by_name(times):
     gripper = told(GRIPPER, np.array(times))
     with pytest.raises(FileFormatError, match=r"gripper .*record .* more often, .*--joints"):
         read(told(ARM, at(100)), gripper)
     assert read(told(ARM, at(100)), gripper, joints=ARM).names == ARM
+
+
+@pytest.mark.parametrize(
+    ("times", "often"), [(at(5), "10 times"), (at(50, end=0.8), "40 times"), ([0.5], "once")]
+)
+@pytest.mark.parametrize("clock", [0.0, -600.0])  # a latched message is as old as its publisher
+def test_a_gripper_that_holds_its_value_needs_no_rate(times, often, clock):
+    gripper = told(GRIPPER, np.array(times), clock=clock)
+    for m in gripper:
+        m.content.position = np.array([0.04])
+    recording = read(told(ARM, at(100)), gripper)
+    np.testing.assert_allclose(recording.times, at(100))
+    np.testing.assert_allclose(recording.positions[:, 2], 0.04)
+    (remark,) = recording.remarks
+    assert f"gripper told {often}, last at {times[-1] + clock:.3g} s, held at 0.04" in remark
+
+
+@pytest.mark.parametrize("key", [("/arm", "/gripper"), None])
+def test_a_joint_told_too_seldom_whose_topic_was_asked_for_is_named(key):
+    recording = read(told(ARM, at(100)), told(GRIPPER, at(4)), joints=ARM, key=key)
+    assert recording.names == ARM
+    assert ["gripper" in remark for remark in recording.remarks] == [True] * (key is not None)
 
 
 def test_a_joint_without_positions_is_refused_by_name():

@@ -84,7 +84,8 @@ def read_messages(
     """Return one episode, whose frames are the messages that tell the most of the wanted joints.
 
     Other joints are interpolated at their times, each from the first topic that names it; frames
-    before or after such a joint is told are left out. FileFormatError if it is told too seldom.
+    before or after such a joint is told are left out. One that holds a value all along is taken to
+    hold it in every frame; FileFormatError if one that moves is told too seldom.
     """
     owner: dict[str, int] = {}
     for topic, messages in enumerate(topics):
@@ -105,11 +106,20 @@ def read_messages(
     positions, motion = _positions(kept, names), _positions(kept, most)
     inside = np.ones(len(kept), dtype=bool)
     joined: dict[str, list[str]] = {}
+    held: list[str] = []
+    seldom: list[str] = []
     for joint, series in _series_beside(bag, topics, owner, names, wanted, remarks):
         by = clock if all(m.sent > 0 for m in series) else _RECORDER
+        times, at, values = _series(kept, series, joint, by)
+        if len(values) and np.ptp(values) <= _HELD:
+            names = (*names, joint)
+            positions = np.column_stack([positions, np.interp(times, at, values)])
+            often = "once" if len(values) == 1 else f"{len(values)} times"
+            last = f"last at {at[-1]:.3g} s"
+            held += [f"{joint} told {often}, {last}, held at {values[0]:.3g}"] * (joint in wanted)
+            continue
         if joint in wanted and series and by == _HEADER != options.time_column:
             _refuse_late(bag, joint, series, kept)
-        times, at, values = _series(kept, series, joint, by)
         gap, longest = _gap(at, times, motion)
         if gap <= longest:
             names = (*names, joint)
@@ -120,6 +130,8 @@ def read_messages(
                 f"more than {longest:.3g} s of it; record {joint} more often, or leave it out of "
                 "--joints"
             )
+        else:
+            seldom.append(joint)
         if joint in wanted:
             inside &= (times >= at[0]) & (times <= at[-1])
             joined.setdefault(by, []).append(joint)
@@ -127,7 +139,10 @@ def read_messages(
         what = f"{say_names(those)} interpolated by {_CLOCKS[by]} at the times of "
         outside = f"; {np.sum(~inside)} frames that not all span left out" * (not all(inside))
         remarks.append(f"{what}{say_names(most)}{outside}")
-    if (skipped := len(topics[owner[most[0]]]) - len(kept)) and not joined:
+    remarks += held
+    if seldom and options.key:
+        remarks.append(f"not read: {say_names(seldom)}, told too seldom for the motion")
+    if (skipped := len(topics[owner[most[0]]]) - len(kept)) and not (joined or held):
         remarks.append(f"{skipped} messages without all joints skipped")
     # Since the first stamp; since 1970, nanoseconds would be 256 ns coarse as floats.
     stamps = np.array([m.at(clock) - kept[0].at(clock) for m in kept], dtype=np.float64)[inside]
