@@ -83,6 +83,16 @@ def test_without_joints_every_joint_of_a_topic_beside_is_taken():
     }
 
 
+@pytest.mark.parametrize("stamped", [0, 150])
+def test_header_stamps_that_are_missing_are_named_where_they_are_asked_for(stamped):
+    arm = [*told(ARM, at(100))[:stamped], *told(ARM, at(100), stamped=False)[stamped:]]
+    topics = arm, told(GRIPPER, at(50))
+    missing = rf"{200 - stamped} of 200 .*shoulder, elbow.*--time-column recorder"
+    with pytest.raises(FileFormatError, match=missing):
+        read(*topics, time_column="header")
+    check(read(*topics, time_column="recorder"))
+
+
 def test_messages_without_stamps_are_joined_by_the_recorders_and_it_is_said():
     recording = read(told(ARM, at(100)), told(GRIPPER, at(50), stamped=False))
     check(recording)

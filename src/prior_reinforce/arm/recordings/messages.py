@@ -316,6 +316,12 @@ def _by_clock(
         raise ConfigurationError(
             f"--time-column {asked} is no clock of a bag; give {_HEADER} or {_RECORDER}"
         )
+    unstamped = sum(m.sent <= 0 for m in messages)
+    if asked == _HEADER and unstamped:
+        raise FileFormatError(
+            f"{bag}: header stamps are 0, or missing, in {unstamped} of {len(messages)} messages "
+            f"of {say_names(joints)}; give --time-column {_RECORDER}"
+        )
     # Since the first stamp; since 1970, nanoseconds would be 256 ns coarse as floats.
     sent, came = (
         np.array([m.at(clock) - messages[0].at(clock) for m in messages], dtype=np.float64)
@@ -328,7 +334,7 @@ def _by_clock(
     is_set_back = late > 0 and (np.diff(sent).min() < -_JUMP or detour > _DETOUR)
     if asked == _RECORDER or (asked == _HEADER and is_set_back):
         return messages, asked, []
-    if asked is None and (min(m.sent for m in messages) <= 0 or is_set_back or np.ptp(sent) == 0):
+    if asked is None and (unstamped or is_set_back or np.ptp(sent) == 0):
         return messages, _RECORDER, ["header stamps unusable, times are those of the recorder"]
     said = [f"{late} messages came late, and are put in order by their header stamps"] * (late > 0)
     if asked == _HEADER:
