@@ -168,6 +168,9 @@ def test_two_publishers_of_a_gripper_are_told_apart(same_topic, moves):
     if moves:
         with pytest.raises(FileFormatError, match=r"several publishers .*; record one of them al"):
             read(*topics)
+        recording = read(*topics, joints=ARM)
+        assert recording.names == ARM
+        assert "not read: gripper, of publishers that disagree" in recording.remarks
         return
     recording = read(*topics)
     check(recording)

@@ -192,21 +192,28 @@ def _series_beside(
     wanted: Sequence[str],
     remarks: list[str],
 ) -> list[tuple[str, list[Message]]]:
-    """Every joint beside `names` with the messages that tell it; of wanted ones, of one publisher.
+    """Every joint beside `names` with the messages of its only publisher that tell it.
 
-    What is said of other publishers is added to the remarks.
+    What is said of other publishers is added to the remarks. FileFormatError if those of a wanted
+    joint disagree; others are left out then.
     """
     together: dict[tuple[int, ...], list[str]] = {}  # joints by topic and index of its messages
     for joint in (joint for joint in owner if joint not in names):
         messages = enumerate(topics[owner[joint]])
-        which = (i for i, m in messages if joint in m.content.name and len(m.content.position))
-        together.setdefault((owner[joint], *which), []).append(joint)
+        told_by = (i for i, m in messages if joint in m.content.name and len(m.content.position))
+        together.setdefault((owner[joint], *told_by), []).append(joint)
     each = []
     for (topic, *which), joints in together.items():
         series = [topics[topic][i] for i in which]
         asked = [joint for joint in joints if joint in wanted]
-        if series and asked:
-            series, said = _of_one_publisher(bag, series, asked)
+        if series:
+            try:
+                series, said = _of_one_publisher(bag, series, asked or joints)
+            except FileFormatError:
+                if asked:
+                    raise
+                remarks.append(f"not read: {say_names(joints)}, of publishers that disagree")
+                continue
             remarks += said
         each += [(joint, series) for joint in joints]
     return each
