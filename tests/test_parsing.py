@@ -369,6 +369,10 @@ def test_numbers_up_to_twice_those_shown_are_in_the_outcomes_unit():
         assert as_place(place, of("rad"), shown) == pytest.approx([8.0])
         with pytest.raises(InvalidGoalError, match="deg"):
             as_place(place, of("rad"), shown[1:])
+    for place in ("16", np.array([16.0])):  # a slip of units is a factor of 57 or more
+        assert as_place(place, of("rad"), shown) == pytest.approx([16.0])
+        with pytest.raises(InvalidGoalError, match="deg"):
+            as_place(place, of("rad"), 0.9 * shown)
     assert read_uncertain_place("8 +- 1", of("rad"), shown)[0] == pytest.approx([8.0])
     assert as_place("8rad", of("rad"), shown[1:]) == pytest.approx([8.0])
 

@@ -17,7 +17,14 @@ from prior_reinforce.errors import (
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.plans.plan_format import PlanFormat
-from prior_reinforce.plans.symmetry import Learned, TurnJoint, scale_alone, turn_and_scale
+from prior_reinforce.plans.symmetry import (
+    Learned,
+    TurnJoint,
+    TurnPoses,
+    scale_alone,
+    shift,
+    turn_and_scale,
+)
 
 FORMAT = PlanFormat(names=("joint1", "joint2"), units=("rad", "rad"), dt=0.01)
 RNG_SEED = 0
@@ -307,6 +314,18 @@ def test_a_motion_is_turned_in_metres_alone():
         make(symmetry=TURN, outcome_format=centimetres)
     with pytest.raises(ConfigurationError, match="outcomes are in cm"):
         make(outcome_format=centimetres).with_symmetry(TURN)
+    for names, units, symmetry in [
+        (("joint1", "joint2"), ("deg", "deg"), TURN),
+        (("x", "y"), ("mm", "mm"), shift()),
+        (("x", "y"), ("mm", "mm"), turn_and_scale(TurnPoses((0.4, 0.0), (0, 1)), (0.4, 0.0))),
+    ]:
+        with pytest.raises(ConfigurationError, match=f"plans are in {units[0]}.* m and rad"):
+            make(format=PlanFormat(names, units, 0.01)).with_symmetry(symmetry)
+    tempo = make(
+        format=PlanFormat(("x", "y"), ("mm", "mm"), 0.01),
+        outcomes_seen=[[1.0], [2.0], [3.0], [4.0]],
+    )
+    assert tempo.with_symmetry(scale_alone()).symmetry is not None  # which knows no place
 
 
 def test_one_demonstration_has_the_spread_of_its_symmetry():

@@ -166,8 +166,8 @@ class DisplacedTrials:
         """Return the condition to try next; see `Adapter.propose`."""
         goal = self._normalisation.apply(goal_seen)
         condition = self._most_probable(goal)
-        told = self._memory.only(self._memory.missed)
-        tried = told.only(self._as_now(told, goal) & np.all(told.goals == goal, axis=1))
+        missed = self._memory.only(self._memory.missed)
+        tried = missed.only(self._as_now(missed, goal) & np.all(missed.goals == goal, axis=1))
         if tried_again(condition[None], tried.conditions, tried.missed_by)[0]:
             condition = self._likeliest_beside(condition, goal, tried)
         return self._normalisation.undo(condition)

@@ -158,7 +158,7 @@ class MovedTrials:
                 "demonstrate nearer to it"
             )
         several = len(belief.prior.anchors.z) > symmetry.k
-        instead = "; a model of the demonstrations alone: generator auto,symmetry=none" * several
+        instead = "; or learn the demonstrations without it: generator auto,symmetry=none" * several
         if model.name == OTHER_WAY:
             return f"outcomes follow the symmetry ({symmetry.name}) the other way round{instead}"
         if self.doubted:
@@ -250,7 +250,7 @@ class MovedTrials:
     def _likeliest_beside(self, condition: Point, goal: Point, missed: Memory) -> Point:
         """Return the condition around another that most probably hits and was not tried.
 
-        The same again where plans may not be moved as far as what was not tried.
+        The condition itself where plans for all of those would be moved too far.
         """
         at, radius = self._places(condition[None], goal[None]), missed.missed_by[-1]
         there = self.belief.outcomes(0, at)

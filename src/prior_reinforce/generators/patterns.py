@@ -123,7 +123,7 @@ def _ways(
         labels = fcluster(linkage(vectors[members], "ward"), 2, "maxclust")
         halving = [members[labels == label] for label in (1, 2)]
         missed = sum(_left_out(motions[half], outcomes[half]) for half in halving)
-        # Fewer do not tell what any one affine law of the outcome leaves.
+        # An affine law of the outcome fits fewer exactly, whatever they are.
         enough = max(fewest, outcomes.shape[1] + 1)
         if min(map(len, halving)) >= enough and missed < apart:
             apart, halves = missed, halving

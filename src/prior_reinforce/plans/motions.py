@@ -155,6 +155,7 @@ class Demonstrations:
         Raises:
             InvalidDemonstrationsError: None, several whose outcomes lie in a subspace (on one line
                 when k = 2) without a symmetry, shapes that do not fit, values that are not finite.
+            ConfigurationError: What the symmetry turns or shifts is not in m and rad.
         """
         if isinstance(self.plans, (list, tuple)):
             horizons = sorted({np.asarray(plan).shape[0] for plan in self.plans if np.ndim(plan)})
@@ -406,7 +407,7 @@ class Demonstrations:
                 f"the symmetry {symmetry.name!r} moves columns that plans do not have; they have "
                 f"{self.action_dim}: {', '.join(self.format.names)}"
             )
-        symmetry.check_units(self.outcome_format.units)
+        symmetry.check_units(self.outcome_format.units, self.format.units)
         return symmetry.around(self.outcomes_seen)
 
     def _oddities(self, *, unit_stated: bool) -> Iterator[str]:

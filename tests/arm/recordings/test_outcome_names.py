@@ -192,12 +192,10 @@ def test_columns_that_name_some_recordings_alike_agree():
 
 
 @pytest.mark.parametrize(
-    "others", ["landing_x landing_y", "x_meas y_meas", "xLanded yLanded", "x2 y2"]
+    "others", ["landing_x landing_y", "x_meas y_meas", "x_ist y_ist", "xLanded yLanded", "x2 y2"]
 )
 def test_other_columns_that_may_be_the_outcomes_are_asked_about(tmp_path, others):
-    with pytest.raises(
-        FileFormatError, match=others.replace(" ", ", ") + " beside x, y: .*target_"
-    ):
+    with pytest.raises(FileFormatError, match=others.replace(" ", ", ") + " beside x, y: .*note_"):
         other_places(tmp_path, ["x", "y"], others.split())
 
 
@@ -207,4 +205,5 @@ def test_columns_that_are_no_outcomes_by_their_names_are_left_out(tmp_path):
     assert other_places(tmp_path, [], beside) == []
     others = ["velocity_x", "velocity_y", "x_px", "y_px"]
     assert other_places(tmp_path, ["x", "y"], others) == others
+    assert other_places(tmp_path, ["x", "y"], ["note_x2", "note_y2"]) == ["note_x2", "note_y2"]
     assert other_places(tmp_path, ["angle"], ["elbow_angle"]) == ["elbow_angle"]

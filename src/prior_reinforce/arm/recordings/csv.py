@@ -195,11 +195,11 @@ def _changes(cells: Sequence[str]) -> list[int]:
 
 def _refuse_labels_again(table: Table, column: int) -> None:
     """FileFormatError if labels of episodes come again where another column changes: a session."""
-    of_throws = [row for row, label in enumerate(table.cells[column]) if label]
-    table = table.rows(of_throws)
-    own, changes = table.cells[column], _changes(table.cells[column])
-    if len({*own}) == len(changes):
+    labels = [label for label in table.cells[column] if label]
+    if len({*labels}) == len(_changes(labels)):
         return
+    table = table.rows([row for row, label in enumerate(table.cells[column]) if label])
+    own, changes = table.cells[column], _changes(table.cells[column])
     for name, cells in zip(table.names, table.cells, strict=True):
         labels = {*zip(cells, own, strict=True)}
         if {*_changes(cells)} < {*changes} and len(labels) == len(changes):

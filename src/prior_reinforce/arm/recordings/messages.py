@@ -111,30 +111,28 @@ def read_messages(
     for joint, series in _series_beside(bag, topics, owner, names, wanted, remarks):
         by = clock if all(m.sent > 0 for m in series) else _RECORDER
         times, at, values = _series(kept, series, joint, by)
-        if len(values) and np.ptp(values) <= _HELD:
-            names = (*names, joint)
-            positions = np.column_stack([positions, np.interp(times, at, values)])
+        if len(values) and np.ptp(values) <= _HELD:  # no rate tells more of it
             often = "once" if len(values) == 1 else f"{len(values)} times"
             last = f"last at {at[-1]:.3g} s"
             held += [f"{joint} told {often}, {last}, held at {values[0]:.3g}"] * (joint in wanted)
-            continue
-        if joint in wanted and series and by == _HEADER != options.time_column:
-            _refuse_late(bag, joint, series, kept)
-        gap, longest = _gap(at, times, motion)
-        if gap <= longest:
-            names = (*names, joint)
-            positions = np.column_stack([positions, np.interp(times, at, values)])
-        elif joint in wanted:
-            raise FileFormatError(
-                f"{bag}: nothing tells {joint} for {gap:.3g} s of a motion that is too fast for "
-                f"more than {longest:.3g} s of it; record {joint} more often, or leave it out of "
-                "--joints"
-            )
         else:
-            seldom.append(joint)
-        if joint in wanted:
-            inside &= (times >= at[0]) & (times <= at[-1])
-            joined.setdefault(by, []).append(joint)
+            if joint in wanted and series and by == _HEADER != options.time_column:
+                _refuse_late(bag, joint, series, kept)
+            gap, longest = _gap(at, times, motion)
+            if gap > longest and joint not in wanted:
+                seldom.append(joint)
+                continue
+            if gap > longest:
+                raise FileFormatError(
+                    f"{bag}: nothing tells {joint} for {gap:.3g} s of a motion that is too fast "
+                    f"for more than {longest:.3g} s of it; record {joint} more often, or leave it "
+                    "out of --joints"
+                )
+            if joint in wanted:
+                inside &= (times >= at[0]) & (times <= at[-1])
+                joined.setdefault(by, []).append(joint)
+        names = (*names, joint)
+        positions = np.column_stack([positions, np.interp(times, at, values)])
     for by, those in joined.items():
         what = f"{say_names(those)} interpolated by {_CLOCKS[by]} at the times of "
         outside = f"; {np.sum(~inside)} frames that not all span left out" * (not all(inside))

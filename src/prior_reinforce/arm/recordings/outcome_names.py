@@ -33,21 +33,13 @@ _ERRORS = re.compile(
     r"fehler|abweichung)([^a-z].*)?"
 )
 """Names of what is measured from a target."""
-_NO_OUTCOMES = {
-    "target",
-    "goal",
-    "aim",
-    "aimed",
-    "desired",
-    "wanted",
-    "planned",
-    "reference",
-    "ref",
-}
+_NO_OUTCOMES = {"target", "goal", "aim", "aimed", "desired", "wanted", "planned", "ref", "note"}
+_NO_OUTCOMES |= {"reference", "soll", "ziel"}
 _NO_OUTCOMES |= {"command", "commanded", "cmd", "release", "released", "start", "initial", "begin"}
 """Words in the names of places that are not where the object landed."""
 _OUTCOMES = {"landing", "landed", "land", "actual", "measured", "meas", "hit", "impact", "outcome"}
 _OUTCOMES |= {"end", "final", "result", "rest", "stop", "stopped", "seen", "true", "real"}
+_OUTCOMES |= {"ist", "gemessen", "landung"}
 """Words in the names of places that may be where it landed."""
 _FILES = {"file", "filename", "path", "recording", "video", "bag", "log"}
 """Names of columns that say the file of a recording."""
@@ -186,10 +178,12 @@ def telling_column(
 
 
 def _telling_columns(keys: Sequence[Key], there: Sequence[str], where: str) -> Sequence[Key]:
-    """The files of recordings, else the columns called so and others of exact names alone.
+    """The columns by which rows are matched to recordings.
 
-    Where each repeats itself, that is one of the names of recordings numbered by all.
-    InvalidDemonstrationsError if there are none.
+    A column of file names that names every recording decides. Else all count that name each row
+    otherwise, and have to agree. Where only several columns together tell rows apart, as run and
+    throw do, recordings are matched that are numbered by both (`run1_throw2`);
+    InvalidDemonstrationsError if they are not.
     """
     named = [key for i, key in enumerate(keys) if i == 0 or key[0] in ROW_COLUMNS]
     alone = [key for key in named if len({*key[1]}) == len(key[1])]
@@ -281,7 +275,7 @@ def other_places(path: Path, names: Collection[str], beside: Sequence[str]) -> l
             own = ", ".join(names)
             raise FileFormatError(
                 f"{path} has {', '.join(others)} beside {own}: call where the object landed {own}, "
-                "and take out the other columns, or put target_ or release_ before their names"
+                "and take out the other columns, or put note_ before their names"
             )
         left_out += others
     return left_out

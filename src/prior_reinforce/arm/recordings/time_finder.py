@@ -224,8 +224,8 @@ def _may_be_clock(rate: float | None, name: str, stamps: Stamps) -> bool:
 def _samples(rate: float, stamps: Stamps) -> bool:
     """Whether a column of any name steps as the clock of a sampler does, of frames at a rate.
 
-    It steps evenly. If its origin is farther away than it goes, as since a machine's start, it is
-    no share of a way, and may contradict that rate.
+    It steps evenly. Numbers that count from long before the recording, as since a machine was
+    started, are surely a clock, and are held against the rate however far they are from it.
     """
     numbers = stamps.astype(float)
     steps = np.diff(numbers, axis=0)

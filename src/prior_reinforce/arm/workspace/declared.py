@@ -76,7 +76,7 @@ class DeclaredSymmetry(Struct, frozen=True, forbid_unknown_fields=True):
             release_frame=self.release_frame,
             steps=self.steps,
         )
-        symmetry.check_units(outcomes.units)
+        symmetry.check_units(outcomes.units, form.units)
         return symmetry
 
 

@@ -20,10 +20,20 @@ from jaxtyping import Bool, Float
 from prior_reinforce.arrays import Frames, Point, Points
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.symmetry.charts import AnyChart, Cartesian, LogDistance, Polar
-from prior_reinforce.plans.symmetry.moves import AnyMove, Learned, Moved, Shift, Tempo
+from prior_reinforce.plans.symmetry.moves import (
+    Amplitude,
+    AnyMove,
+    Delay,
+    Learned,
+    Moved,
+    Shift,
+    Tempo,
+)
 from prior_reinforce.units import factor
 
 Matrix = Float[np.ndarray, "k k"]
+_PLAYED = (Tempo, Amplitude, Delay, Learned)
+"""Moves that know no place and no angle: columns may be in any unit."""
 EXTRAPOLATED = 0.5
 """How far beyond the demonstrated range what was learned is believed, as a part of it (ours: see
 `Demonstrations.far_outside`)."""
@@ -109,14 +119,25 @@ class Symmetry:
         """Whether a clock releases, as its tempo says."""
         return any(isinstance(move, Tempo) and move.keep_horizon for move in self.moves)
 
-    def check_units(self, units: Sequence[str]) -> None:
-        """Hold it against the units of outcomes: what is turned or shifted is in metres.
+    def check_units(self, outcomes: Sequence[str], plans: Sequence[str]) -> None:
+        """Check that what is turned or shifted is in m and rad, as places and angles of moves are.
+
+        Args:
+            outcomes: Units of an outcome's components.
+            plans: Units of a plan's columns.
 
         Raises:
-            ConfigurationError: They are of another length, of which a turn about a place in metres
-                gives another motion than is meant.
+            ConfigurationError: One is another length or angle: a turn would give another motion
+                than is meant.
         """
-        lengths = [unit for unit in units[:2] if factor(unit, "m") not in (None, 1.0)]
+        moved = [c for m in self.moves if not isinstance(m, _PLAYED) for c in m.columns_of()]
+        for unit in (plans[column] for column in moved):
+            if any(factor(unit, base) not in (None, 1.0) for base in ("m", "rad")):
+                raise ConfigurationError(
+                    f"plans are in {unit}, and a motion is turned or shifted in m and rad: convert "
+                    "those columns (--action-units m rad ...; recordings are converted)"
+                )
+        lengths = [unit for unit in outcomes[:2] if factor(unit, "m") not in (None, 1.0)]
         if lengths and not isinstance(self.chart, LogDistance):  # which has no place
             raise ConfigurationError(
                 f"outcomes are in {lengths[0]}, and a motion is turned or shifted in the metres of "
