@@ -195,8 +195,8 @@ def _changes(cells: Sequence[str]) -> list[int]:
 
 def _refuse_labels_again(table: Table, column: int) -> None:
     """FileFormatError if labels of episodes come again where another column changes: a session."""
-    labels = [label for label in table.cells[column] if label]
-    if len({*labels}) == len(_changes(labels)):
+    said = [label for label in table.cells[column] if label]
+    if len({*said}) == len(_changes(said)):
         return
     table = table.rows([row for row, label in enumerate(table.cells[column]) if label])
     own, changes = table.cells[column], _changes(table.cells[column])
