@@ -1,9 +1,10 @@
 """What the numbers of a plan's frames mean; how turns and signs move is in `test_whole_turns`."""
 
+import numpy as np
 import pytest
 
 from prior_reinforce.errors import InvalidPlanError
-from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.plans.plan_format import PlanFormat, stepped, summed
 
 
 @pytest.mark.parametrize(
@@ -26,3 +27,18 @@ def test_a_text_is_no_list_of_names():
         PlanFormat(("pan", "arm"), "rad", 0.02)
     with pytest.raises(InvalidPlanError, match="names must be a list"):
         PlanFormat("pan", ("rad",), 0.02)
+
+
+def test_increments_are_told_by_name_and_a_rate_is_none():
+    names = ("dx", "dyaw", "drx", "delta_joint1", "x", "joint1", "dy", "d_joint2", "DZ")
+    units = ("m", "rad", "rad", "rad", "m", "rad", "m/s", "rad/s", "m")
+    form = PlanFormat(names, units, 0.02)
+    assert [names[i] for i in form.increments] == ["dx", "dyaw", "drx", "delta_joint1", "DZ"]
+
+
+def test_increments_are_summed_from_0_and_taken_apart_again():
+    frames = np.array([[1.0, 5.0], [2.0, 6.0], [-0.5, 7.0]])
+    poses = summed(frames, [0])
+    np.testing.assert_array_equal(poses, [[0, 5], [1, 6], [3, 7], [2.5, 7]])
+    np.testing.assert_array_equal(stepped(poses, [0]), frames)
+    np.testing.assert_array_equal(summed(np.stack([frames, frames]), [0])[1], poses)

@@ -270,9 +270,13 @@ class Ask(OnWorkspace):
         print(f"plan: {workspace.plan_file(trial).path}")
         form = manifest.format
         first = zip(form.names, trial.plan[0].round(4) + 0.0, form.units, strict=True)
-        begins = ", ".join(f"{name} {q:.4g} {unit}" for name, q, unit in first)
+        begins = [f"{name} {q:.4g} {unit}" for name, q, unit in first]
+        if moved := form.increments:
+            begins = [of for i, of in enumerate(begins) if i not in moved]
+            begins.append(f"the pose where demonstrations of {form.names[moved[0]]} began")
         print(
-            f"it begins at {begins}" + ("" if self.execute else ": move the arm there slowly first")
+            f"it begins at {', '.join(begins)}"
+            + ("" if self.execute else ": move the arm there slowly first")
         )
         out = self._out_of(trial.number)
         if out is not None:

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
+from jaxtyping import Float
 
 from prior_reinforce.arrays import Frames, Point, is_positive
 from prior_reinforce.errors import InvalidPlanError
 from prior_reinforce.plans.whole_turns import TURN, other_form
+
+_INCREMENT = re.compile(r"d(x|y|z|rx|ry|rz|roll|pitch|yaw)|delta_\w+", re.IGNORECASE)
+"""What an increment is called."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +74,15 @@ class PlanFormat:
         """D, the number of action dimensions."""
         return len(self.names)
 
+    @property
+    def increments(self) -> tuple[int, ...]:
+        """Columns that say by how much a pose moves on until the next frame: `dx`, `delta_joint1`.
+
+        What counts of them is their sum. A rate, as in m/s, is no increment.
+        """
+        each = enumerate(zip(self.names, self.units, strict=True))
+        return tuple(i for i, (n, unit) in each if _INCREMENT.fullmatch(n) and "/" not in unit)
+
     def toward(self, frames: Frames, pose: Point) -> Frames:
         """Return a motion in the turns and signs in which its first frame is nearest to a pose.
 
@@ -88,3 +103,31 @@ class PlanFormat:
             if np.linalg.norm(other[0] - pose[columns]) < np.linalg.norm(own[0] - pose[columns]):
                 frames[:, columns] = other
         return frames
+
+
+def summed(
+    frames: Float[np.ndarray, "*N T D"], increments: Sequence[int]
+) -> Float[np.ndarray, "*N T+1 D"]:
+    """Return the poses of a motion of increments: their sums from 0 on, with one frame more.
+
+    Between poses a motion can be sampled anew. Other columns hold their last value.
+
+    Args:
+        frames: Shape (..., T, D).
+        increments: Columns (`PlanFormat.increments`).
+    """
+    poses = np.concatenate([frames, frames[..., -1:, :]], axis=-2)
+    columns = list(increments)
+    poses[..., 0, columns] = 0.0
+    poses[..., 1:, columns] = np.cumsum(frames[..., columns], axis=-2)
+    return poses
+
+
+def stepped(
+    poses: Float[np.ndarray, "*N P D"], increments: Sequence[int]
+) -> Float[np.ndarray, "*N P-1 D"]:
+    """Return the increments between poses; undoes `summed`."""
+    frames = np.array(poses[..., :-1, :])
+    columns = list(increments)
+    frames[..., columns] = np.diff(poses[..., columns], axis=-2)
+    return frames

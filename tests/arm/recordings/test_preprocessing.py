@@ -134,6 +134,31 @@ def test_jittered_stamps_are_put_on_the_grid():
         assert np.abs(done.plans[i][:100] - moved).max() < 0.01
 
 
+@pytest.mark.parametrize("rate", [25, 40, 200])
+def test_increments_at_another_rate_go_the_same_way(rate):
+    """The sum is what counts: 25 frames a second have increments twice those of 50."""
+    t = np.arange(60) / 50
+    speed = 0.4 * np.sin(np.pi * np.clip((t - 0.2) / 0.8, 0, 1)) ** 2
+    steps = np.column_stack([speed / 50, 0.1 * t])
+    done = preprocess([recording(t, steps)], ("m", "rad"), Preprocessing(dt=1 / rate), [0])
+    assert done.plans[0, :, 0].sum() == pytest.approx(steps[:, 0].sum(), abs=2e-5)
+    middle = int(np.argmax(done.plans[0, :, 0]))
+    assert done.plans[0, middle, 0] == pytest.approx(0.4 / rate, rel=0.02)
+    # What is no increment is sampled as ever.
+    times = done.starts[0] + np.arange(done.plans.shape[1]) / rate
+    np.testing.assert_allclose(done.plans[0, :, 1], 0.1 * np.minimum(times, t[-1]), atol=1e-3)
+
+
+def test_increments_at_their_own_rate_stay_and_are_0_once_the_motion_is_over():
+    t = np.arange(30) / 50
+    steps = np.column_stack([0.01 + 0.002 * np.sin(t * 9), 0.02 * t])
+    short, long = recording(t[:20], steps[:20], "0"), recording(t, steps, "1")
+    done = preprocess([short, long], ("m", "rad"), Preprocessing(trim=False), [0])
+    np.testing.assert_allclose(done.plans[1], steps, atol=1e-12)
+    np.testing.assert_allclose(done.plans[0, :20], steps[:20], atol=1e-12)
+    np.testing.assert_allclose(done.plans[0, 20:], [[0.0, steps[19, 1]]] * 10, atol=1e-12)
+
+
 def test_a_gripper_step_does_not_ring():
     t = np.arange(41) / 20
     q = np.column_stack([np.sin(t), (t >= 1.0) * 0.08])

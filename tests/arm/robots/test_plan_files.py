@@ -67,6 +67,17 @@ def test_a_finer_rate(plan, tmp_path):
     np.testing.assert_allclose(back.actions[::10], plan.actions, atol=1e-12)
 
 
+@pytest.mark.parametrize("rate", [50, 200])
+def test_increments_at_another_rate_go_the_same_way(rate):
+    speed = 0.3 * np.sin(np.linspace(0, np.pi, 101)) ** 2
+    grip = 0.5 - 0.5 * np.cos(np.linspace(0, np.pi, 101))
+    form = PlanFormat(("dx", "grip"), ("m", "1"), DT)
+    plan = Plan(np.column_stack([speed * DT, grip]), form)
+    other = resample_plan(plan, rate)
+    assert other.actions[:, 0].sum() == pytest.approx(plan.actions[:, 0].sum(), abs=1e-6)
+    assert other.actions[:, 0].max() == pytest.approx(0.3 / rate, rel=0.01)
+
+
 @pytest.mark.parametrize("rate", [0.5, 3.0])
 def test_a_rate_that_makes_another_motion_is_refused(plan, rate):
     """Two points, half a radian off what was checked."""

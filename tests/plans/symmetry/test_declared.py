@@ -89,6 +89,13 @@ def test_increments_are_played_turned_and_shifted_as_such():
     assert declare_symmetry(STEPS, 2, distance="shift").increments == (0, 1)
 
 
+def test_increments_of_a_tilt_are_refused_since_a_turn_would_leave_them_behind():
+    form = PlanFormat(("dx", "dy", "drx", "dry"), ("m", "m", "rad", "rad"), 0.04)
+    with pytest.raises(ConfigurationError, match="drx, dry turn with the motion"):
+        declare_symmetry(form, 2, about=(0.0, 0.0))
+    assert declare_symmetry(form, 2, distance="shift").moves == (Shift(0, 8), Shift(1, 8))
+
+
 def test_neither_leaves_a_scaling_of_one_outcome():
     assert kinds(declare_symmetry(JOINTS, 1)) == [Tempo]
     assert kinds(declare_symmetry(JOINTS, 1, distance="amplitude")) == [Amplitude]

@@ -26,10 +26,11 @@ from prior_reinforce.arm.robots.gate import check_plan
 from prior_reinforce.arm.robots.gate_settings import GateSettings
 from prior_reinforce.arm.robots.limits import RobotLimits, joint_of, match_joints
 from prior_reinforce.arm.robots.report import LimitLine, LimitReport
+from prior_reinforce.arrays import Plans
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError, InvalidPlanError
 from prior_reinforce.plans.interpolation import RATE
 from prior_reinforce.plans.motions import Demonstrations, Plan
-from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.plans.plan_format import PlanFormat, summed
 from prior_reinforce.plans.speeds import Channels
 from prior_reinforce.plans.symmetry import Symmetry
 from prior_reinforce.units import UNITS, factor
@@ -111,13 +112,19 @@ class Inspection:
         left_out = self.selection.left_out
         first = (
             self.copies,
-            all_return(self.processed.plans),
+            all_return(self._poses),
             *self.selection.remarks,
             *self._broken(),
             self._noise_warning(),
         )
         last = f"left out although it moves: {left_out} ({_TAKE_IT})" if left_out else ""
         return tuple(filter(None, (*first, last, *self.processed.remarks)))
+
+    @property
+    def _poses(self) -> Plans:
+        """The plans, with the poses that increments lead to."""
+        plans, increments = self.processed.plans, self.format.increments
+        return summed(plans, increments) if increments else plans
 
     @property
     def _refusals(self) -> list[list[LimitLine]]:
@@ -245,7 +252,7 @@ class Inspection:
         )
 
     def _motion(self) -> str:
-        names, units, plans = self.selection.names, self.selection.units, self.processed.plans
+        names, units, plans = self.selection.names, self.selection.units, self._poses
         ranges = np.ptp(plans, axis=(0, 1))
         most = int(np.argmax(ranges))
         speeds = np.abs(np.diff(plans, axis=1)).max(axis=1) / self.processed.dt
@@ -309,7 +316,7 @@ def inspect(selection: Selection, wanted: Wanted) -> Inspection:
         check_scale(before, selection)
     selection, form = aligned(selection, robot, before)
     how = wanted.preprocessing or Preprocessing()
-    processed = preprocess(selection.recordings, selection.units, how)
+    processed = preprocess(selection.recordings, selection.units, how, form.increments)
     form = replace(form, dt=processed.dt)
     shown = () if before is None else before.plans
     odd = odd_starts([*shown], [*processed.plans], selection.episodes, form.names, form.units)

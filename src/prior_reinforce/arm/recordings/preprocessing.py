@@ -24,6 +24,7 @@ from prior_reinforce.arm.recordings.time_finder import LONGEST
 from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.arrays import Frames, Plans
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
+from prior_reinforce.plans.plan_format import stepped, summed
 from prior_reinforce.plans.signals import Signals, analyse, moving_ends, moving_rows
 from prior_reinforce.plans.speeds import Channels, largest_of_unit
 from prior_reinforce.settings import Checked, NonNegative, Positive
@@ -101,12 +102,20 @@ class Preprocessed:
 
 
 def preprocess(
-    recordings: Sequence[Recording], units: Sequence[str], settings: Preprocessing
+    recordings: Sequence[Recording],
+    units: Sequence[str],
+    settings: Preprocessing,
+    increments: Sequence[int] = (),
 ) -> Preprocessed:
     """Trim and resample N recordings of the same D channels, in `units`, and to one horizon.
 
-    InvalidDemonstrationsError if an episode never moves, exceeds the horizon, or leaps.
+    Increments are summed up before, and taken between frames after: half as many frames a second
+    have increments twice as large. InvalidDemonstrationsError if an episode never moves, exceeds
+    the horizon, or leaps.
     """
+    durations = [recording.duration for recording in recordings]
+    if increments:
+        recordings = [_with_poses(recording, increments) for recording in recordings]
     refuse_leaps(recordings, units)
     dt = settings.dt or _common_dt(recordings)
     recordings = [_held_while_unchanged(recording) for recording in recordings]
@@ -126,16 +135,17 @@ def preprocess(
         off = [after - before for before, after in zip(pieces, smooth, strict=True)]
         changes = np.array([[np.sqrt(np.mean(o**2, axis=0)), np.abs(o).max(axis=0)] for o in off])
         pieces = smooth
-    longest = max(map(len, pieces))
+    more = 1 if increments else 0
+    longest = max(map(len, pieces)) - more
     horizon = settings.horizon or longest
     remarks: dict[tuple[_Kind, str], list[str]] = {}
     for recording, (piece, jumping), span in zip(recordings, sampled, spans, strict=True):
-        if len(piece) > horizon:
+        if (frames := len(piece) - more) > horizon:
             raise InvalidDemonstrationsError(
-                f"episode {recording.episode} has {len(piece)} frames, more than the horizon "
+                f"episode {recording.episode} has {frames} frames, more than the horizon "
                 f"{horizon}; give a horizon of {longest}, or a larger dt (motions are never cut)"
             )
-        held = len(piece) < horizon
+        held = frames < horizon
         for remark in _remarks(recording, span, units, signals, jumping, held=held):
             remarks.setdefault(remark, []).append(recording.episode)
     longest_motion = max(end - start for start, end in spans)
@@ -149,12 +159,14 @@ def preprocess(
         fewer = dt * horizon / _ENOUGH_FRAMES
         what = f"{horizon} frames are many; dt {fewer:.2g} s makes {_ENOUGH_FRAMES}"
         remarks[_Kind.LONG, what] = []
+    rows = horizon + more
+    plans = np.stack([np.pad(p, ((0, rows - len(p)), (0, 0)), mode="edge") for p in pieces])
     return Preprocessed(
-        np.stack([np.pad(p, ((0, horizon - len(p)), (0, 0)), mode="edge") for p in pieces]),
+        stepped(plans, increments) if increments else plans,
         dt,
         tuple(start for start, _ in spans),
-        tuple(end for _, end in spans),
-        sum(len(piece) < horizon for piece in pieces),
+        tuple(min(end, d) for (_, end), d in zip(spans, durations, strict=True)),
+        sum(len(piece) < rows for piece in pieces),
         tuple(np.flatnonzero(signals.held).tolist()),
         signals.noise,
         changes,
@@ -163,6 +175,12 @@ def preprocess(
             for (_, what), e in sorted(remarks.items(), key=lambda item: item[0][0])
         ),
     )
+
+
+def _with_poses(recording: Recording, increments: Sequence[int]) -> Recording:
+    """The recording with poses in place of increments; the last is reached a period later."""
+    times = np.append(recording.times, recording.duration + recording.period)
+    return replace(recording, times=times, positions=summed(recording.positions, increments))
 
 
 def at_rests(recording: Recording, rest: float) -> list[Recording]:

@@ -265,7 +265,8 @@ def all_return(plans: Plans) -> str:
         return ""
     return (
         "every motion ends where it began: if it rests before it goes back, cut it there "
-        "(--rests 0.3), and leave the way back out"
+        "(--rests 0.3), and leave the way back out; if its numbers are increments, from frame to "
+        "frame, call them dx, dy, dyaw, delta_joint1, ... (new --action-names)"
     )
 
 

@@ -28,7 +28,7 @@ from prior_reinforce.errors import (
 from prior_reinforce.files import as_cell, open_npz, sha256, write_once
 from prior_reinforce.plans.interpolation import RATE, interpolate, join_frames
 from prior_reinforce.plans.motions import Plan
-from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.plans.plan_format import PlanFormat, stepped, summed
 
 PlanFileFormat = Literal["npz", "csv", "json"]
 _FILE_FORMAT = "prior-reinforce plan"
@@ -150,10 +150,16 @@ def resample_plan(plan: Plan, rate: float, *, within: float = _LARGEST_CHANGE) -
     _check_rate(rate)
     if math.isclose(rate * plan.format.dt, 1):
         return plan
-    fine = interpolate(plan.actions, plan.format.dt, rate=rate)
-    again = Plan(fine.q, replace(plan.format, dt=1 / rate))
+    increments = plan.format.increments
+    poses = summed(plan.actions, increments) if increments else plan.actions
+    fine = interpolate(poses, plan.format.dt, rate=rate).q
+    again = Plan(
+        stepped(fine, increments) if increments else fine, replace(plan.format, dt=1 / rate)
+    )
     t = np.arange(0, plan.times[-1], 1 / RATE)
-    one, other = (join_frames(each.actions, each.format.dt)(t) for each in (plan, again))
+    one, other = (
+        join_frames(each, dt)(t) for each, dt in ((poses, plan.format.dt), (fine, 1 / rate))
+    )
     if not (off := float(np.abs(one - other).max())) <= within:
         raise InvalidPlanError(
             f"at {rate:g} samples a second the plan is another motion, {off:.2g} off the one that "

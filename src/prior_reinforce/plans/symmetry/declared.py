@@ -44,6 +44,8 @@ _VECTOR, _QUATERNION = ("rx", "ry", "rz"), ("qw", "qx", "qy", "qz")
 _ON_AXIS = 1e-3
 """How far from the first joint's axis a place may be and be on it, [m]. Ours: half a turn about the
 one or the other then differs by 2 mm."""
+_TURNED_STEPS = {"dx", "dy", "dz", "dyaw"}
+"""Increments that a turn about the vertical axis moves as it should."""
 _LEAD = 8
 """Frames within which a hand that is told increments is brought to its moved start (ours)."""
 
@@ -90,7 +92,7 @@ def declare_symmetry(
         raise ConfigurationError(
             f"release_frame says about which frame tempo plays a motion; distance is {distance!r}"
         )
-    increments = _columns(column, ("dx", "dy", "dz", "dyaw"))
+    increments = form.increments
     if distance == "shift":
         place = _columns(column, ("x", "y")) or _columns(column, ("dx", "dy"))
         if len(place) != 2 or k != 2:
@@ -152,6 +154,11 @@ def declare_symmetry(
         )
         return turn_and_scale(turn, centre, scale, others)
     if place := _columns(column, ("dx", "dy")):
+        if tilts := [form.names[i] for i in increments if form.names[i] not in _TURNED_STEPS]:
+            raise ConfigurationError(
+                f"{', '.join(tilts)} turn with the motion, and of increments a turn knows dx, dy, "
+                "dz and dyaw; record poses, or take [symmetry] out"
+            )
         turn = TurnIncrements(start, centre, (place[0], place[1]), column.get("dyaw"), _LEAD)
         return turn_and_scale(turn, centre, scale, others)
     raise ConfigurationError(
@@ -162,7 +169,7 @@ def declare_symmetry(
 def _columns(column: dict[str, int], names: Sequence[str]) -> Columns:
     """Those of these names; none of x and y, or of an attitude, unless all are there."""
     found = tuple(column[name] for name in names if name in column)
-    return found if len(found) == len(names) or names[0] == "dx" else ()
+    return found if len(found) == len(names) else ()
 
 
 def _first_joint(chain: Chain) -> tuple[float, tuple[float, float]]:
