@@ -14,8 +14,14 @@ from prior_reinforce.arrays import Frames, Point, is_positive
 from prior_reinforce.errors import InvalidPlanError
 from prior_reinforce.plans.whole_turns import TURN, other_form
 
-_INCREMENT = re.compile(r"d(x|y|z|rx|ry|rz|roll|pitch|yaw)|delta_\w+", re.IGNORECASE)
+_INCREMENT = re.compile(
+    r"d(x|y|z|rx|ry|rz|roll|pitch|yaw|theta|phi|psi|heading|angle)|delta_\w+", re.IGNORECASE
+)
 """What an increment is called."""
+OF_A_TOOL = (
+    r"grip|jaw|finger|width|claw|opening|suction|robotiq|wsg|greifer|pince|夹爪|夹具|vacuum|valve"
+)
+"""Words in the name of a gripper's or another tool's dimension."""
 
 
 @dataclass(frozen=True)

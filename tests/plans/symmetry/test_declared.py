@@ -89,11 +89,36 @@ def test_increments_are_played_turned_and_shifted_as_such():
     assert declare_symmetry(STEPS, 2, distance="shift").increments == (0, 1)
 
 
-def test_increments_of_a_tilt_are_refused_since_a_turn_would_leave_them_behind():
-    form = PlanFormat(("dx", "dy", "drx", "dry"), ("m", "m", "rad", "rad"), 0.04)
-    with pytest.raises(ConfigurationError, match="drx, dry turn with the motion"):
+@pytest.mark.parametrize(
+    ("names", "left"),
+    [
+        (("x", "y", "theta"), "theta"),  # a heading, were it called yaw
+        (("x", "y", "vx", "vy"), "vx, vy"),
+        (("x", "y", "x2", "y2"), "x2, y2"),
+        (("x", "y", "z", "r11", "r12", "r13"), "r11, r12, r13"),
+        (("x", "y", "q0", "q1", "q2", "q3"), "q0, q1, q2, q3"),
+        (("dx", "dy", "drx", "dry"), "drx, dry"),
+        (("dx", "dy", "dtheta"), "dtheta"),
+    ],
+)
+def test_what_a_turn_would_leave_behind_is_refused_until_it_is_named(names, left):
+    form = PlanFormat(names, ("1",) * len(names), 0.04)
+    with pytest.raises(ConfigurationError, match=f"a turn would leave {left} as recorded"):
         declare_symmetry(form, 2, about=(0.0, 0.0))
-    assert declare_symmetry(form, 2, distance="shift").moves == (Shift(0, 8), Shift(1, 8))
+    unmoved = left.split(", ")
+    assert declare_symmetry(form, 2, about=(0.0, 0.0), steps=unmoved).moves[0].steps == tuple(
+        names.index(name) for name in unmoved
+    )
+
+
+def test_a_shift_knows_every_place():
+    form = PlanFormat(
+        ("x", "y", "z", "x2", "y2", "theta", "jaw_width"), ("m",) * 5 + ("rad", "m"), 0.04
+    )
+    with pytest.raises(ConfigurationError, match="a shift would leave x2, y2 as recorded"):
+        declare_symmetry(form, 2, distance="shift")
+    one = PlanFormat(("dx", "dy", "theta", "width"), ("m", "m", "rad", "m"), 0.04)
+    assert declare_symmetry(one, 2, distance="shift").moves == (Shift(0, 8), Shift(1, 8))
 
 
 def test_neither_leaves_a_scaling_of_one_outcome():

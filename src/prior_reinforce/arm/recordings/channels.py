@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from enum import Enum
 from itertools import takewhile
 
+from prior_reinforce.plans.plan_format import OF_A_TOOL
 from prior_reinforce.plans.whole_turns import CIRCLES, TURN, attitudes, euler_angles
 from prior_reinforce.units import base_of
 
@@ -50,10 +51,7 @@ _WITHIN = (
     r"|head|pan|tilt"
 )
 """Words of angles: that outweigh a gripper's, that stand alone, or within others (`Handgelenk`)."""
-_TOOL = (
-    r"grip|jaw|finger|width|claw|opening|suction|robotiq|wsg|greifer|pince|夹爪|夹具|vacuum|valve"
-    r"|pressure|force|torque|voltage|temperature"
-)
+_TOOL = rf"{OF_A_TOOL}|pressure|force|torque|voltage|temperature"
 _SLIDE = (
     r"[de]\d|ext(ernal)?([_ ]?axis)?[_ ]?\d*|rail|track|linear|slider?|gantry|prismatic|carriage"
 )

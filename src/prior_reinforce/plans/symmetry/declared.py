@@ -12,14 +12,16 @@ rz, or qw, qx, qy and qz, or yaw), or increments of them (dx, dy, dyaw).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+import re
+from collections.abc import Collection, Iterable, Sequence
+from typing import Literal
 
 import numpy as np
 from msgspec import UNSET
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.kinematics import UPRIGHT, Chain, first_axis, leaning
+from prior_reinforce.plans.plan_format import OF_A_TOOL, PlanFormat
 from prior_reinforce.plans.symmetry.moves import (
     NOMINAL_EXPONENT,
     Amplitude,
@@ -34,18 +36,15 @@ from prior_reinforce.plans.symmetry.moves import (
 )
 from prior_reinforce.plans.symmetry.symmetry import Symmetry, scale_alone, shift, turn_and_scale
 from prior_reinforce.plans.whole_turns import euler_angles
-
-if TYPE_CHECKING:
-    from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.units import kind_of
 
 About = Literal["base"] | tuple[float, float] | None
 Distance = Literal["tempo", "amplitude", "learned", "shift"]
 _VECTOR, _QUATERNION = ("rx", "ry", "rz"), ("qw", "qx", "qy", "qz")
+_TOOL = re.compile(OF_A_TOOL, re.IGNORECASE)
 _ON_AXIS = 1e-3
 """How far from the first joint's axis a place may be and be on it, [m]. Ours: half a turn about the
 one or the other then differs by 2 mm."""
-_TURNED_STEPS = {"dx", "dy", "dz", "dyaw"}
-"""Increments that a turn about the vertical axis moves as it should."""
 _LEAD = 8
 """Frames within which a hand that is told increments is brought to its moved start (ours)."""
 
@@ -77,7 +76,7 @@ def declare_symmetry(
         ranges: Their ends, [rad]; turned plans go the other way round where that fits alone.
         start: (x, y) of the hand before increments, [m].
         release_frame: Where a clock lets go, and not the motion.
-        steps: Names of grippers and triggers.
+        steps: Names of grippers, triggers, and what else a turn leaves as it is.
         exponent: p of distance ~ speed^p: 1 for a level throw from a height, whose fall takes the
             same time at any speed; 2 for a throw upwards and a slide; less by the share of the
             distance that the object is carried.
@@ -100,6 +99,10 @@ def declare_symmetry(
                 "distance 'shift' needs plans with x and y (or dx and dy) and outcomes x and y; "
                 f"plans have {', '.join(form.names)}, outcomes {k} components"
             )
+        places = [i for i, unit in enumerate(form.units) if kind_of(unit) == "length"]
+        _refuse_left_behind(
+            form, "shift", {*place, *increments, *_columns(column, ("z",))}, steps, places
+        )
         return shift((place[0], place[1]), _LEAD if increments else 0)
     stepped = tuple(column[name] for name in steps)
     scale: AnyMove = Amplitude(exponent, stepped, increments)
@@ -149,16 +152,15 @@ def declare_symmetry(
                     "vectors rx, ry, rz in radians, quaternions qw, qx, qy, qz, and yaw; record "
                     "one of these, or take [symmetry] out"
                 )
+        known = (*place, *vector, *quaternion, *_named(column, ("z", "yaw")))
+        known += _columns(column, ("roll", "pitch", "yaw"))
+        _refuse_left_behind(form, "turn", known, steps)
         turn: AnyMove = TurnPoses(
             centre, (place[0], place[1]), vector or None, quaternion or None, column.get("yaw")
         )
         return turn_and_scale(turn, centre, scale, others)
     if place := _columns(column, ("dx", "dy")):
-        if tilts := [form.names[i] for i in increments if form.names[i] not in _TURNED_STEPS]:
-            raise ConfigurationError(
-                f"{', '.join(tilts)} turn with the motion, and of increments a turn knows dx, dy, "
-                "dz and dyaw; record poses, or take [symmetry] out"
-            )
+        _refuse_left_behind(form, "turn", _named(column, ("dx", "dy", "dz", "dyaw")), steps)
         turn = TurnIncrements(start, centre, (place[0], place[1]), column.get("dyaw"), _LEAD)
         return turn_and_scale(turn, centre, scale, others)
     raise ConfigurationError(
@@ -170,6 +172,36 @@ def _columns(column: dict[str, int], names: Sequence[str]) -> Columns:
     """Those of these names; none of x and y, or of an attitude, unless all are there."""
     found = tuple(column[name] for name in names if name in column)
     return found if len(found) == len(names) else ()
+
+
+def _named(column: dict[str, int], names: Sequence[str]) -> Columns:
+    """Those of these names."""
+    return tuple(column[name] for name in names if name in column)
+
+
+def _refuse_left_behind(
+    form: PlanFormat,
+    move: str,
+    known: Collection[int],
+    steps: Sequence[str],
+    among: Iterable[int] | None = None,
+) -> None:
+    """Refuse columns that a move would leave as they are, unless they are a tool's or are named.
+
+    A second place, a heading of another name or a velocity turns with the motion.
+    """
+    alone = {*steps, *form.per_plan}
+    left = [
+        form.names[i]
+        for i in (range(form.action_dim) if among is None else among)
+        if i not in known and form.names[i] not in alone and not _TOOL.search(form.names[i])
+    ]
+    if left:
+        raise ConfigurationError(
+            f"a {move} would leave {', '.join(left)} as recorded: it moves x, y, z and yaw, rx, ry, "
+            "rz in radians, qw, qx, qy, qz, and increments dx, dy, dz, dyaw; rename columns that "
+            f"are these, and of what is right so say steps = {left}"
+        )
 
 
 def _first_joint(chain: Chain) -> tuple[float, tuple[float, float]]:
