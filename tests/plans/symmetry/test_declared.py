@@ -121,6 +121,19 @@ def test_a_shift_knows_every_place():
     assert declare_symmetry(one, 2, distance="shift").moves == (Shift(0, 8), Shift(1, 8))
 
 
+def test_rates_are_played_as_what_they_add_up_to():
+    """Velocities of a motion that is played twice as fast are twice as large."""
+    form = PlanFormat(("joint1", "speed2"), ("rad", "rad/s"), 0.02)
+    t = np.arange(60) / 59
+    plan = np.column_stack([t**2 * (3 - 2 * t), 6 * t * (1 - t) / (59 * 0.02)])
+    symmetry = declare_symmetry(form, 1, exponent=1.0)
+    np.testing.assert_allclose(symmetry.move(plan, np.array([0.0])), plan, atol=1e-9)
+    moved = symmetry.move(plan, np.array([np.log(2.0)]))
+    assert np.ptp(moved[:, 0]) == pytest.approx(1.0, abs=1e-3)
+    assert moved[:, 1].sum() * 0.02 == pytest.approx(1.0, abs=0.02)
+    assert moved[:, 1].max() == pytest.approx(2 * plan[:, 1].max(), rel=0.02)
+
+
 def test_neither_leaves_a_scaling_of_one_outcome():
     assert kinds(declare_symmetry(JOINTS, 1)) == [Tempo]
     assert kinds(declare_symmetry(JOINTS, 1, distance="amplitude")) == [Amplitude]

@@ -91,7 +91,8 @@ def declare_symmetry(
         raise ConfigurationError(
             f"release_frame says about which frame tempo plays a motion; distance is {distance!r}"
         )
-    increments = form.increments
+    rates = [i for i, unit in enumerate(form.units) if unit.endswith("/s")]
+    increments = tuple(sorted({*form.increments, *rates}))
     if distance == "shift":
         place = _columns(column, ("x", "y")) or _columns(column, ("dx", "dy"))
         if len(place) != 2 or k != 2:
@@ -103,7 +104,7 @@ def declare_symmetry(
         _refuse_left_behind(
             form, "shift", {*place, *increments, *_columns(column, ("z",))}, steps, places
         )
-        return shift((place[0], place[1]), _LEAD if increments else 0)
+        return shift((place[0], place[1]), _LEAD if place[0] in increments else 0)
     stepped = tuple(column[name] for name in steps)
     scale: AnyMove = Amplitude(exponent, stepped, increments)
     others: tuple[AnyMove, ...] = ()
@@ -198,7 +199,7 @@ def _refuse_left_behind(
     ]
     if left:
         raise ConfigurationError(
-            f"a {move} would leave {', '.join(left)} as recorded: it moves x, y, z and yaw, rx, ry, "
+            f"a {move} would leave {', '.join(left)} as recorded: it moves x, y, z, yaw, rx, ry, "
             "rz in radians, qw, qx, qy, qz, and increments dx, dy, dz, dyaw; rename columns that "
             f"are these, and of what is right so say steps = {left}"
         )

@@ -21,6 +21,7 @@ from typing_extensions import Self
 from prior_reinforce.arrays import Frames
 from prior_reinforce.plans.interpolation import minimum_jerk
 from prior_reinforce.plans.kinematics import Chain, turned_path
+from prior_reinforce.plans.plan_format import stepped, summed
 
 Columns = tuple[int, ...]
 Ends = tuple[float, float]
@@ -94,22 +95,15 @@ class Tempo(Move, frozen=True, tag="tempo"):
     steps: Columns = ()
     """Columns of grippers and triggers, on lines between frames instead of a spline."""
     increments: Columns = ()
-    """Columns that are differences from frame to frame; the path that they add up to is played."""
+    """Columns that are differences from frame to frame, or rates; what they add up to is played."""
 
     def _moved(self, plan: Frames, amount: float) -> Moved:
-        added = list(self.increments)
-        path, about = plan, self.about
-        if added:  # a frame before the first, from which its difference leads
-            path = np.vstack([plan[:1], plan])
-            path[0, added] = 0.0
-            path[:, added] = np.cumsum(path[:, added], axis=0)
-            about = None if about is None else about + 1
-        out = self._played(path, math.exp(amount / self.exponent), about)
-        if added:
-            changes = np.diff(out[:, added], axis=0)
-            out = out[1:]
-            out[:, added] = changes
-        return out
+        speed = math.exp(amount / self.exponent)
+        if not self.increments:
+            return self._played(plan, speed, self.about)
+        about = None if self.about is None else self.about + 1  # one pose more before the first
+        poses = self._played(summed(plan, self.increments), speed, about)
+        return stepped(poses, self.increments)
 
     def _played(self, path: Frames, speed: float, about: float | None) -> Moved:
         from scipy.interpolate import CubicSpline
@@ -142,7 +136,7 @@ class Amplitude(Move, frozen=True, tag="amplitude"):
     steps: Columns = ()
     """Columns that stay as they are."""
     increments: Columns = ()
-    """Columns that are differences from frame to frame."""
+    """Columns that are differences from frame to frame, or rates."""
 
     def _moved(self, plan: Frames, amount: float) -> Moved:
         origin = plan[0].copy()
