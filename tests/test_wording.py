@@ -13,6 +13,7 @@ from prior_reinforce.wording import (
     say_place,
     say_trials,
     to_words,
+    too_far,
 )
 
 METRES = OutcomeFormat.metres(2)
@@ -149,3 +150,24 @@ def test_one_number_with_a_comma_is_not_two_far_ones():
 def test_no_empty_example_is_given_of_a_task_that_has_none():
     with pytest.raises(InvalidFeedbackError, match=r'left, right, or "hit" or "miss"$'):
         from_words("green", of("pins", "pins"))
+
+
+@pytest.mark.parametrize(
+    ("goal", "words"),
+    [
+        ([1.0, 0.4], ""),
+        ([1.0, 0.5], "long and left"),
+        ([0.1, -0.9], "right"),
+        ([-0.7, 0.6], "short and left"),
+        ([-0.9, 0.1], "short"),
+    ],
+)
+def test_words_for_too_far_where_a_throw_goes_to_a_side(goal, words):
+    assert too_far(goal, METRES) == words
+    assert too_far([*goal, 0.3], of("m", "m", "m")) == words
+
+
+def test_no_words_for_too_far_where_outcomes_have_none():
+    assert too_far([0.0, 0.9], MIXED) == ""
+    assert too_far([-0.9], of("m")) == ""
+    assert too_far([0.9, 0.0], of("m", "m", names="yx")) == "left"

@@ -118,6 +118,18 @@ def to_words(error: ArrayLike, form: OutcomeFormat | None = None) -> str:
     return ", ".join(term for term in said if not term.startswith("0 ")) or "on the goal"
 
 
+def too_far(goal: ArrayLike, form: OutcomeFormat) -> str:
+    """Say which words mean too far where a throw goes to a side: `long and left`; else empty."""
+    axes, place = axes_of(form), np.asarray(goal, dtype=float)
+    if not (in_words(form) and {0, 1} <= {*axes}):
+        return ""
+    along = np.arctan2(place[axes.index(1)], place[axes.index(0)])
+    eighths = np.rint(along / (np.pi / 4)) * (np.pi / 4)
+    parts = zip(np.round([np.cos(eighths), np.sin(eighths)]), WORDS[:2], strict=True)
+    words = [word[0 if part > 0 else 1] for part, word in parts if part]
+    return "" if words == [WORDS[0][0]] else " and ".join(words)
+
+
 def say_reading(reading: Reading, form: OutcomeFormat) -> str:
     """Describe what was seen: in its own words, with all units, else as its number."""
     if reading.said:

@@ -118,6 +118,14 @@ def test_ask_says_what_the_trial_may_expect(run, folder):
     assert "a hit is" not in run("ask", folder)[1]
 
 
+def test_where_a_throw_goes_to_a_side_the_words_for_too_far_are_said(run, folder):
+    run("goal", folder, "0.9", "0.05")
+    assert "too far is" not in run("ask", folder)[1]
+    run("tell", folder, 1, "hit")
+    run("goal", folder, "0.8", "0.35")
+    assert "behind the robot: here, too far is long and left)" in run("ask", folder)[1]
+
+
 def test_what_was_told_is_repeated_as_it_was_understood(run, folder):
     run("goal", folder, "0.9", "0.05")
     run("ask", folder)

@@ -53,7 +53,7 @@ from prior_reinforce.files import check_path
 from prior_reinforce.parsing import as_place
 from prior_reinforce.session.trials import State, Trial
 from prior_reinforce.terminal import RED, coloured
-from prior_reinforce.wording import in_words, say_place, to_words
+from prior_reinforce.wording import in_words, say_place, to_words, too_far
 
 if TYPE_CHECKING:
     from prior_reinforce.arm.executing.drive import Look
@@ -162,6 +162,9 @@ class Ask(OnWorkspace):
         else:
             wait = "execute it, then say where the object went:"
             print("checked; nothing moved" if self.check else wait)
+            goal = now.state.goal_of(trial).goal
+            if side := too_far(goal, workspace.manifest.outcome_format):
+                print(f"(words are of somebody behind the robot: here, too far is {side})")
         print_next(workspace)
         return 0
 
