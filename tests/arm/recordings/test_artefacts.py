@@ -66,6 +66,16 @@ def test_a_clock_that_leaps_while_the_joints_go_on_is_refused(rate, shift):
     assert ("an hour" in str(refused.value)) == (shift == 3600)
 
 
+@pytest.mark.parametrize(("clock", "other"), [("header", "recorder"), ("recorder", "header")])
+def test_of_a_bag_whose_clock_was_set_the_other_is_named(clock, other):
+    t, s = course(100)
+    stamps = {"header": "header stamps in ns", "recorder": "the recorder's stamps in ns"}
+    bag = Recording("7", t + (t > 0.86), np.column_stack([s, 0.4 * s]), clock=stamps[clock])
+    with pytest.raises(InvalidDemonstrationsError, match=rf"--time-column {other}\)") as refused:
+        refuse_leaps([bag], ["rad", "rad"])
+    assert "none" not in str(refused.value)
+
+
 @pytest.mark.parametrize("rate", [20, 100, 500])
 def test_frames_that_were_lost_held_or_late_are_no_leap_of_the_clock(rate):
     t, s = course(rate)

@@ -104,14 +104,17 @@ def _refuse_set_clock(recording: Recording) -> None:
         after = waits[k + 1 : k + 1 + round(waits[k] / period)]
         even = np.max(waits[around]) < 2 * period and np.median(after) > period / 2
         if len(around) == 4 and np.any(fast) and goes_on and even:
-            shift = f"{shifts[k]:.3f} s"
+            shift, remedy = f"{shifts[k]:.3f} s", "--time-column none --rate HZ"
+            if "stamps" in recording.clock:  # a bag's, which has two
+                remedy = "write the positions as CSV, or try the bag's other clock: --time-column "
+                remedy += "recorder" if "header" in recording.clock else "header"
             hour = " (an hour, as local time does in spring)" if round(shifts[k], 1) == 3600 else ""
             raise InvalidDemonstrationsError(
                 f"episode {recording.episode}: time leaps by {shift}{hour} at frame {k + 1} "
                 f"({t[k]:.3f} s, then {t[k + 1]:.3f} s), while the joints go on by one frame's "
                 "step, so it is the times that are wrong, as where a clock was set: read the "
-                "frames at their known rate with --time-column none --rate HZ, correct the times "
-                "from there on, or leave that episode out (--leave-out)"
+                f"frames at their known rate ({remedy}), correct the times from there on, or leave "
+                "that episode out (--leave-out)"
             )
 
 
