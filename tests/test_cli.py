@@ -144,6 +144,15 @@ def test_every_help_has_an_example_and_says_no_none(capsys, name):
         assert "WORKSPACE" in shown.partition("\n\n")[0]
 
 
+def test_what_an_option_does_is_one_paragraph_however_its_source_is_wrapped(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit):
+        main(("new", "--help"))
+    lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    first = next(i for i, line in enumerate(lines) if line.startswith("Names of the action dim"))
+    assert lines[first + 1] == "given, with no robot those that the first import has."
+
+
 @pytest.mark.parametrize("args", [(), ("-h",), ("--help",)])
 def test_alone_it_lists_the_commands_by_what_they_are_for(run, args):
     status, out, err = run(*args)

@@ -162,7 +162,7 @@ def read(kind: type[AnyCommand], program: str, args: list[str]) -> AnyCommand:
 
     # Else the usage lacks the words that are there already.
     rest = ["--help"] if {"-h", "--help"} & {*args} else args
-    with _in_one_line(program):
+    with _in_one_line(program), nullcontext() if rest is args else _without_line_breaks():
         command = tyro.cli(
             kind,
             prog=program,
@@ -234,6 +234,30 @@ def _in_one_line(program: str) -> Iterator[None]:
         raise ConfigurationError(f"cannot read the command line ({error}); see --help") from error
     else:
         sys.stderr.write(box.getvalue())
+
+
+@contextmanager
+def _without_line_breaks() -> Iterator[None]:
+    """Let tyro see descriptions of options in one line each.
+
+    docstring_parser leaves later lines indented, and tyro then breaks lines there.
+    """
+    import docstring_parser
+    from docstring_parser import Docstring, DocstringStyle
+
+    parse = docstring_parser.parse_from_object
+
+    def joined(obj: object, style: DocstringStyle = DocstringStyle.AUTO) -> Docstring:
+        parsed = parse(obj, style)
+        for option in parsed.params:
+            option.description = " ".join((option.description or "").split())
+        return parsed
+
+    docstring_parser.parse_from_object = joined
+    try:
+        yield
+    finally:
+        docstring_parser.parse_from_object = parse
 
 
 def _tidied(shown: str) -> str:
