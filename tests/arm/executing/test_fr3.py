@@ -2,6 +2,7 @@
 
 import contextlib
 import itertools
+import os
 import re
 import signal
 from types import SimpleNamespace
@@ -23,6 +24,13 @@ from simulators import served
 TASK = make_task("basketball-fr3")
 READY = TASK.demonstrations("A").plans[0, 0]
 FORM = TASK.format
+
+
+@pytest.fixture(autouse=True)
+def usual_priority():
+    """libfranka lets its thread run before all others; later tests would starve what they start."""
+    yield
+    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 @pytest.fixture(scope="module")
