@@ -39,6 +39,6 @@ def test_increments_are_told_by_name_and_a_rate_is_none():
 def test_increments_are_summed_from_0_and_taken_apart_again():
     frames = np.array([[1.0, 5.0], [2.0, 6.0], [-0.5, 7.0]])
     poses = summed(frames, [0])
-    np.testing.assert_array_equal(poses, [[0, 5], [1, 5], [3, 6], [2.5, 7]])
+    np.testing.assert_array_equal(poses, [[0, 5], [1, 6], [3, 7], [2.5, 7]])
     np.testing.assert_array_equal(stepped(poses, [0]), frames)
     np.testing.assert_array_equal(summed(np.stack([frames, frames]), [0])[1], poses)

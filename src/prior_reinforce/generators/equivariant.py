@@ -7,7 +7,7 @@ What a generator has to learn is one dimension less for each exact component (*c
 `plans.symmetry`), and nothing at all where no component is left or one demonstration is all there
 is: that demonstration is moved. Beyond the demonstrated hull of what is left, plans are moved from
 its edge; components that are `Learned` the generator extrapolates instead. Without a symmetry the
-wrapped generator learns as it is.
+wrapped generator learns as it is, unless demonstrations show a turn and it is to be found.
 
 Ours; the idea is that of canonical and frame-averaging policies.
 """
@@ -27,7 +27,8 @@ from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.generators.base import Generator, OnProgress, Wrapper, at_once
 from prior_reinforce.generators.saving import SavedLayer, Tensors
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.symmetry import Anchors, Symmetry
+from prior_reinforce.plans.symmetry import Anchors, Symmetry, TurnJoint
+from prior_reinforce.plans.symmetry.found import find_turn
 
 
 class Equivariant(Wrapper):
@@ -46,6 +47,17 @@ class Equivariant(Wrapper):
     _home: Point
     """Exact components to which plans are brought, the others 0, shape (k,)."""
 
+    def __init__(self, generator: Generator, *, finds: bool = False) -> None:
+        """Wrap a generator; see `Wrapper`.
+
+        Args:
+            generator: Of canonical plans.
+            finds: Whether a turn is looked for where no symmetry is declared
+                (`plans.symmetry.found`).
+        """
+        super().__init__(generator)
+        self._finds = finds
+
     def check_demonstrations(self, demonstrations: Demonstrations) -> None:
         """Refuse too few to tell what a turn leaves; see `Generator.check_demonstrations`."""
         symmetry = demonstrations.symmetry
@@ -60,7 +72,8 @@ class Equivariant(Wrapper):
                 )
 
     def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:
-        symmetry = demonstrations.symmetry
+        declared = demonstrations.symmetry
+        symmetry = declared or (find_turn(demonstrations) if self._finds else None)
         if symmetry is None:
             self._anchors = None
             self.generator.fit(demonstrations, seed=seed, progress=progress)
@@ -76,6 +89,8 @@ class Equivariant(Wrapper):
             how = "the nearest demonstration is moved to the goal"
             how = how if demonstrations.n > 1 else "the demonstration is moved to the goal"
         self.remarks = (f"symmetry: {symmetry.name}; {how}",)
+        if declared is None:
+            self.remarks = (_say_found(symmetry, demonstrations.format.names),)
 
     def _keep(self, symmetry: Symmetry, plans: Plans, outcomes: Points, noise: Points) -> Anchors:
         anchors = Anchors(symmetry, outcomes, noise)
@@ -173,6 +188,16 @@ class Equivariant(Wrapper):
         if anchors.mixed == (generator is None):
             raise ValueError("the canonical plans' generator does not fit the demonstrations")
         return made
+
+
+def _say_found(symmetry: Symmetry, names: Sequence[str]) -> str:
+    """Say which joint demonstrations show to be turned by the bearing, and how to leave it so."""
+    turn = symmetry.moves[1]
+    assert isinstance(turn, TurnJoint)
+    return (
+        f"symmetry: {names[turn.joint]} turns with the outcome's bearing, so a turn about the base "
+        "is taken out, and the rest learned (not so: generator auto,symmetry=none)"
+    )
 
 
 def rested(plans: Sequence[Float[np.ndarray, "_ D"]], increments: Sequence[int] = ()) -> Plans:

@@ -82,7 +82,9 @@ class GeneratorRegistry(Registry["Generator"]):
         generator = super()._make(name, own, context, choice)
         if timing != "none":
             generator = Timed(generator, cast("Timing", timing))
-        return generator if symmetry == "none" else Equivariant(generator)
+        if symmetry == "none":
+            return generator
+        return Equivariant(generator, finds=name == "auto")
 
     def name_of(self, made: Generator) -> str | None:
         """Return the name of a generator's class, wrapped or not; None where it has none."""

@@ -114,17 +114,18 @@ class PlanFormat:
 def summed(
     frames: Float[np.ndarray, "*N T D"], increments: Sequence[int]
 ) -> Float[np.ndarray, "*N T+1 D"]:
-    """Return the poses of a motion of increments: their sums, from 0 a frame before the first.
+    """Return the poses of a motion of increments: before each frame, from 0 on, and after the last.
 
-    Between poses a motion can be sampled anew. Other columns begin with their first value twice.
+    Between poses a motion can be sampled anew. Other columns stay beside the pose at which they
+    are commanded, and hold their last value.
 
     Args:
         frames: Shape (..., T, D).
         increments: Columns (`PlanFormat.increments`).
     """
-    poses, columns = np.concatenate([frames[..., :1, :], frames], axis=-2), list(increments)
+    poses, columns = np.concatenate([frames, frames[..., -1:, :]], axis=-2), list(increments)
     poses[..., 0, columns] = 0.0
-    poses[..., columns] = np.cumsum(poses[..., columns], axis=-2)
+    poses[..., 1:, columns] = np.cumsum(frames[..., columns], axis=-2)
     return poses
 
 
@@ -132,6 +133,6 @@ def stepped(
     poses: Float[np.ndarray, "*N P D"], increments: Sequence[int]
 ) -> Float[np.ndarray, "*N P-1 D"]:
     """Return the increments between poses; undoes `summed`."""
-    frames, columns = np.array(poses[..., 1:, :]), list(increments)
+    frames, columns = np.array(poses[..., :-1, :]), list(increments)
     frames[..., columns] = np.diff(poses[..., columns], axis=-2)
     return frames

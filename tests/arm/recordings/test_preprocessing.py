@@ -144,7 +144,7 @@ def test_increments_at_another_rate_go_the_same_way(rate):
     assert done.plans[0, :, 0].sum() == pytest.approx(steps[:, 0].sum(), abs=2e-5)
     middle = int(np.argmax(done.plans[0, :, 0]))
     assert done.plans[0, middle, 0] == pytest.approx(0.4 / rate, rel=0.02)
-    # What is no increment is sampled as ever, beside the pose that each step leads to.
+    # What is no increment is sampled as ever, beside the pose at which it was recorded.
     times = np.minimum(done.starts[0] + np.arange(done.plans.shape[1]) / rate, t[-1])
     np.testing.assert_allclose(done.plans[0, :, 1], 0.05 - 0.05 * np.cos(2.0 * times), atol=5e-4)
 

@@ -13,7 +13,7 @@ from reproduction.demonstrations import DRAWN
 from reproduction.evaluation import GOAL_SEED
 from reproduction.recipes.adaptation import TASKS, later
 from reproduction.recipes.base import Planned, Recipe, Scale
-from reproduction.recipes.once import COPIES, NONE, OURS, SHOWN, Declared, Shown
+from reproduction.recipes.once import COPIES, NONE, OURS, SHOWN, Declared, Shown, generator_of
 from reproduction.recipes.tables import Columns, Table, mean_of
 from reproduction.results import FIRST, ROUNDS, TRIALS, Measure, Results
 from reproduction.sequences import Afternoons
@@ -55,7 +55,7 @@ def units(scale: Scale, include: Sequence[str] = ()) -> list[Planned]:
 def _afternoon(scale: Scale, declared: Declared, task: str, name: str, adapter: str) -> Afternoons:
     of_set = ("A", "B", *DRAWN).index(name)
     subset = None if declared == "none" else (of_set % SHOWN[TASKS[task]],)
-    training = Shown(TASKS[task], name, "auto", of_set, subset, symmetry=declared)
+    training = Shown(TASKS[task], name, generator_of(declared), of_set, subset, symmetry=declared)
     return Afternoons(
         training, task, 1, adapter=adapter, carry_over=True, goals=GOALS, rounds=scale.rounds,
         seed=GOAL_SEED + of_set,

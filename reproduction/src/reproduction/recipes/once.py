@@ -123,6 +123,11 @@ def augmented(shown: Demonstrations, symmetry: Symmetry, region: np.ndarray) -> 
     )
 
 
+def generator_of(declared: Declared) -> str:
+    """Return what learns: controls without a symmetry look for none either."""
+    return "auto,symmetry=none" if declared in ("none", "copies") else "auto"
+
+
 @dataclass(frozen=True)
 class OutsideTrials(Trials):
     """Try goals 10 to 20 cm outside the task's region, other ones on every set."""
@@ -213,7 +218,7 @@ def _trials(scale: Scale, method: Method, task: str, name: str, count: int, numb
     subset = tuple(sorted(int(i) for i in np.roll(order, -number)[:count]))
     name = _OF_ZOO.format(of_set) if task in ZOO else name
     training = Shown(
-        TASKS.get(task, task), name, "auto", 10 * of_set + number, subset,
+        TASKS.get(task, task), name, generator_of(method.symmetry), 10 * of_set + number, subset,
         perception="eye" if method.seen == EYE_LABELS else None, symmetry=method.symmetry,
     )  # fmt: skip
     few = replace(scale, goals=min(scale.goals, _GOALS if method.thorough else _GOALS_BESIDE))

@@ -113,8 +113,8 @@ def preprocess(
     have increments twice as large. InvalidDemonstrationsError if an episode never moves, exceeds
     the horizon, or leaps.
     """
-    before = [recording.period if increments else 0.0 for recording in recordings]
-    if increments:  # a pose more before the first frame
+    durations = [recording.duration for recording in recordings]
+    if increments:
         recordings = [_with_poses(recording, increments) for recording in recordings]
     refuse_leaps(recordings, units)
     dt = settings.dt or _common_dt(recordings)
@@ -164,10 +164,8 @@ def preprocess(
     return Preprocessed(
         stepped(plans, increments) if increments else plans,
         dt,
-        tuple(
-            max(s + (dt - b if b else 0.0), 0.0) for (s, _), b in zip(spans, before, strict=True)
-        ),
-        tuple(end - b for (_, end), b in zip(spans, before, strict=True)),
+        tuple(start for start, _ in spans),
+        tuple(min(end, d) for (_, end), d in zip(spans, durations, strict=True)),
         sum(len(piece) < rows for piece in pieces),
         tuple(np.flatnonzero(signals.held).tolist()),
         signals.noise,
@@ -180,8 +178,8 @@ def preprocess(
 
 
 def _with_poses(recording: Recording, increments: Sequence[int]) -> Recording:
-    """The recording with poses in place of increments; the first is a period earlier."""
-    times = np.insert(recording.times + recording.period, 0, 0.0)
+    """The recording with poses in place of increments; the last is reached a period later."""
+    times = np.append(recording.times, recording.duration + recording.period)
     return replace(recording, times=times, positions=summed(recording.positions, increments))
 
 

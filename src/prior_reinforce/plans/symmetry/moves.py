@@ -101,7 +101,7 @@ class Tempo(Move, frozen=True, tag="tempo"):
         speed = math.exp(amount / self.exponent)
         if not self.increments:
             return self._played(plan, speed, self.about)
-        about = None if self.about is None else self.about + 1  # one pose more before the first
+        about = None if self.about is None else self.about + 1  # poses are reached after frames
         poses = self._played(summed(plan, self.increments), speed, about)
         return stepped(poses, self.increments)
 

@@ -1,0 +1,84 @@
+"""A turn about the base that demonstrations show is found; other tasks show none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import prior_reinforce as pr
+from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.plans.symmetry import Learned, TurnJoint
+from prior_reinforce.plans.symmetry.found import find_turn
+
+FORM = PlanFormat(("base", "lift", "grip"), ("rad", "rad", "1"), 0.02)
+
+
+def throws(n=6, *, way=1.0, centre=(0.0, 0.0), off=0.0, form=FORM, slope=1.0, seed=0):
+    """Swings of `lift` whose `base` is turned by the outcome's bearing about an axis."""
+    rng = np.random.default_rng(seed)
+    bearing, distance = rng.uniform(-0.5, 0.5, n), rng.uniform(0.8, 1.2, n)
+    place = distance[:, None] * np.column_stack([np.cos(bearing), np.sin(bearing)]) + centre
+    s = np.linspace(0, 1, 50)
+    swing = 10 * s**3 - 15 * s**4 + 6 * s**5
+    plans = np.zeros((n, 50, form.action_dim))
+    base = 0.7 + way * slope * bearing + off * rng.normal(size=n)
+    plans[:, :, 0] = base[:, None] + 0.05 * swing
+    plans[:, :, 1] = swing * distance[:, None]
+    return Demonstrations(plans, place, form)
+
+
+@pytest.mark.parametrize("n", [4, 8])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_first_joint_that_follows_the_bearing_is_a_turn_about_the_base(way, n):
+    found = find_turn(throws(n, way=way, off=0.01))
+    assert found is not None
+    assert found.moves == (Learned(), TurnJoint(0, way))
+    # A plan turned by 0.3 rad is the plan with another first joint.
+    plan = throws().plans[0]
+    moved = found.move(plan, np.array([0.0, 0.3]))
+    np.testing.assert_allclose(moved - plan, [[way * 0.3, 0, 0]] * len(plan), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "demonstrations",
+    [
+        throws(3),  # too few
+        throws(off=0.2),  # a joint that goes where it likes
+        throws(8, slope=0.4),  # a push, for which the arm turns less
+        throws(8, centre=(-0.8, 0.0)),  # an axis far behind the base
+        throws(form=replace(FORM, names=("dx", "dy", "dyaw"), units=("m", "m", "rad"))),
+        throws(form=replace(FORM, names=("x", "y", "yaw"), units=("m", "m", "rad"))),
+        throws(form=replace(FORM, units=("1", "1", "1"))),
+    ],
+    ids=["few", "noise", "slope", "far", "increments", "poses", "no angles"],
+)
+def test_other_demonstrations_show_none(demonstrations):
+    assert find_turn(demonstrations) is None
+
+
+def test_outcomes_that_are_no_places_show_none():
+    shown = throws()
+    for form in (
+        OutcomeFormat(("x", "y"), ("cm", "cm")),
+        OutcomeFormat(("height", "x"), ("m", "m")),
+    ):
+        other = Demonstrations(shown.plans, shown.outcomes_seen, shown.format, form)
+        assert find_turn(other) is None
+    one = Demonstrations(shown.plans, shown.outcomes_seen[:, :1], shown.format)
+    assert find_turn(one) is None
+
+
+@pytest.mark.parametrize("name", ["A", "B"])
+@pytest.mark.parametrize(
+    ("task", "way"),
+    [("basketball-v1", 1.0), ("so101", -1.0), ("curling", None), ("fishing", None)],
+)
+def test_shipped_throws_show_a_turn_about_the_base_and_pushes_none(task, way, name):
+    found = find_turn(pr.make_task(task).demonstrations(name))
+    if way is None:
+        assert found is None
+    else:
+        assert found is not None
+        assert found.moves[1] == TurnJoint(0, way)
