@@ -65,3 +65,16 @@ def test_what_is_said_of_first_throws_stands_beside_what_hit_on_drawn_sets(print
     _, text = printed("first_throws", *options, "--perception", "exact")
     assert re.search(r"^\| fishing \| 0\.\d\d \| [01]\.\d\d \|", text, re.MULTILINE)
     assert "6 throws" in text
+
+
+@pytest.mark.slow
+def test_what_a_found_turn_gains_is_a_row_a_task(printed):
+    options = ["--tasks", "zoo-bounce", "zoo-pour", "--sets", "2", "--goals", "2"]
+    _, text = printed("found_turn", *options, "--perception", "exact")
+    mean, with_interval = r"-?\d+\.\d\d", r"-?\d+\.\d\d[^|]*"
+    found, none = re.findall(r"^\| (zoo-\S+ \| \d of 2) \|", text, re.MULTILINE)
+    assert (found, none) == ("zoo-bounce | 2 of 2", "zoo-pour | 0 of 2")
+    # Where none is found, both generators are the same.
+    same = rf"zoo-pour \| 0 of 2 \| ({mean}), \1 \| 0\.00[^|]*\| ({mean}), \2 \| 0\.00[^|]*\|"
+    assert re.search(same, text)
+    assert re.search(rf"zoo-bounce \| 2 of 2 \| {mean}, {mean} \| {with_interval}\|", text)
