@@ -193,9 +193,14 @@ class Reading:
         return cls(zero, -everywhere, everywhere, zero, hit, lost=lost)
 
     @property
+    def has_place(self) -> bool:
+        """Whether it says where the object ended: some bound of the error is known."""
+        return bool(np.any(np.isfinite(self.low) | np.isfinite(self.high)))
+
+    @property
     def has_number(self) -> bool:
         """Whether `error_seen` is informative: some bound is known, or that it hit."""
-        return bool(self.hit or np.any(np.isfinite(self.low) | np.isfinite(self.high)))
+        return bool(self.hit or self.has_place)
 
     def with_hit(self, hit: bool | None) -> Self:
         """Return the reading with `hit` set; None changes nothing."""

@@ -18,6 +18,7 @@ from prior_reinforce.commands.live import (
 )
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.generators.base import FitProgress
+from prior_reinforce.readings import Reading
 from prior_reinforce.simulation.protocol import GoalTrials
 
 DEMONSTRATIONS = SimpleNamespace(n=6, outcome_format=OutcomeFormat.metres(2))
@@ -29,7 +30,7 @@ def trial(number, condition, error_seen, hit=False, p_hit=None):
     return SimpleNamespace(
         number=number,
         condition=np.array(condition),
-        error_seen=np.array(error_seen),
+        reading=Reading.measured(error_seen) if error_seen else Reading.only(hit, 2),
         hit=hit,
         expected=Expectation(p_hit),
     )
@@ -68,6 +69,12 @@ def test_a_trial_of_a_later_goal_is_counted_for_its_goal_and_tells_its_chance(vi
     shown.trial(GoalTrials(GOAL, (first,), ()))
     line = "trial 1  aim at the goal                      hit possible  seen: 5 cm long"
     assert told.getvalue().strip() == line
+
+
+def test_a_miss_of_which_nothing_else_was_told_is_no_near_miss(view):
+    shown, told = view
+    shown.trial(GoalTrials(GOAL, (trial(1, [1.0, 0.1], None),), ()))
+    assert told.getvalue().strip().endswith("seen: missed")
 
 
 def test_a_time_is_no_length():

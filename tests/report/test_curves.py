@@ -6,6 +6,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from prior_reinforce.readings import Reading
 from prior_reinforce.report.curves import draw_errors, draw_plans, draw_trials_by_goal
 from prior_reinforce.report.style import HIT
 from prior_reinforce.session.trials import Stage
@@ -24,6 +25,14 @@ def test_errors_are_drawn_in_centimetres_over_the_trials_own_numbers():
     assert said == ["5 cm", "voided", "1 cm"]
     assert axes.get_title(loc="right") == "shaded: reached, within 1.5 cm"
     assert axes.get_ylim()[1] > 5.0
+
+
+@pytest.mark.parametrize(("hit", "said"), [(True, "hit"), (False, "miss")])
+def test_a_distance_that_nobody_told_is_not_drawn(hit, said):
+    record = told([0.03, 0.04])
+    bare = replace(record.trials[0], reading=Reading.only(hit, 2), hit=hit)
+    (axes,) = draw_errors(replace(record, trials=(bare,))).axes
+    assert [text.get_text() for text in axes.texts] == [said]
 
 
 def test_true_errors_are_hollow():

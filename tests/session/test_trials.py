@@ -70,6 +70,14 @@ def test_events_of_a_trial_say_where_it_stands(then, stage, error_seen):
     assert trial.note == ("slipped" if stage is Stage.VOIDED else "")
 
 
+@pytest.mark.parametrize("said", [Reading.only(True, 2), Reading.only(False, 2)])
+def test_a_bare_hit_or_miss_has_no_error(said):
+    told = replace(TOLD, reading=said.record(), hit=bool(said.hit))
+    (trial,) = state(GOAL, ASKED, told).trials
+    assert trial.error_seen is None
+    assert ("error" in repr(trial), "hit" in repr(trial)) == (False, bool(said.hit))
+
+
 def test_a_log_keeps_what_was_said():
     said = Reading([0.05, 0.0], [0.01, -np.inf], [np.inf, np.inf], [0.0, 0.0], None, "long")
     (trial,) = state(GOAL, ASKED, replace(TOLD, reading=said.record())).trials

@@ -19,7 +19,14 @@ from prior_reinforce.errors import PerceptionFailedError
 from prior_reinforce.parsing import from_words
 from prior_reinforce.readings import Reading
 from prior_reinforce.terminal import plain
-from prior_reinforce.wording import error_example, say_chance, say_count, say_place, to_words
+from prior_reinforce.wording import (
+    error_example,
+    say_chance,
+    say_count,
+    say_place,
+    say_reading,
+    to_words,
+)
 
 if TYPE_CHECKING:
     from prior_reinforce.environment import Rollout
@@ -52,12 +59,11 @@ class LiveView:
     def trial(self, result: GoalTrials) -> None:
         """Print the latest trial: how the condition moved, what was seen, solved or not."""
         trial, goal, before = result.trials[-1], result.goal, result.trials[-2:-1]
-        assert trial.error_seen is not None
+        assert trial.reading is not None
         aimed, moved = (before[0].condition, "moved ") if before else (goal, "")
-        nothing, off, seen = (
-            to_words(error, self._form)
-            for error in (0.0 * goal, trial.condition - aimed, trial.error_seen)
-        )
+        nothing = to_words(0.0 * goal, self._form)
+        off = to_words(trial.condition - aimed, self._form)
+        seen = say_reading(trial.reading, self._form)
         aim = "aim at the goal" if off == nothing else f"aim {moved}{off}"
         shown = ("HIT", "bold green") if trial.hit else "a near miss" if seen == nothing else seen
         p_hit = trial.expected.p_hit

@@ -99,11 +99,12 @@ def draw_errors(record: AdaptationRecord) -> Figure:
     for x, (trial, truth) in enumerate(zip(record.trials, record.true_outcomes, strict=True), 1):
         if truth is not None:
             true[x] = record.distance(truth - record.goal)
-        if trial.error_seen is None or record.landings[x - 1] is None:
-            said = trial.stage.value if trial.error_seen is None else "miss"
+        if (distance := record.distance_seen(trial)) is None:
+            result = "hit" if trial.hit else "miss"
+            said = result if trial.stage is Stage.TOLD else trial.stage.value
             _write(axes, said, (x, tolerance), (0, 8), rotation=90, ha="center")
             continue
-        seen[x] = record.distance(trial.error_seen)
+        seen[x] = distance
         colour = trial_colour(x - 1, n, hit=trial.hit)
         axes.plot(x, seen[x], "o", color=colour, markersize=10, clip_on=False, zorder=5)
         called = CALLED if trial.hit and seen[x] > tolerance else ""

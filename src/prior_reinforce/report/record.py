@@ -144,12 +144,19 @@ class AdaptationRecord:
         """How far an error is from the goal, in `distance_unit`."""
         return self.edge * in_tolerances(error, self.half_axes)
 
+    def distance_seen(self, trial: Trial) -> float | None:
+        """How far off a trial was seen to be, in `distance_unit`; None where nobody told."""
+        reading = trial.reading
+        if reading is None or not np.isfinite([*reading.low, *reading.high]).all():
+            return None
+        return self.distance(reading.error_seen)
+
     @property
     def landings(self) -> tuple[Point | None, ...]:
         """Perceived outcome r tilde of each trial; None unless told with more than "a miss".
 
         A hit that a coarse eye called further off than the tolerance was within it all the same,
-        and is put at its edge.
+        and is put at its edge; one of which nothing else was told, at the goal.
         """
         return tuple(self._landing(trial) for trial in self.trials)
 
@@ -174,7 +181,8 @@ class AdaptationRecord:
         return "cm" if self.scale == 100 else drawn.pop() if len(drawn) == 1 else ""
 
     def _landing(self, trial: Trial) -> Point | None:
-        if trial.error_seen is None or trial.reading is None or not trial.reading.has_number:
+        if trial.reading is None or not trial.reading.has_number:
             return None
-        off = in_tolerances(trial.error_seen, self.half_axes)
-        return self.goal + trial.error_seen / (max(off, 1.0) if trial.hit else 1.0)
+        error = trial.reading.error_seen
+        off = in_tolerances(error, self.half_axes)
+        return self.goal + error / (max(off, 1.0) if trial.hit else 1.0)

@@ -162,8 +162,7 @@ def _row(record: AdaptationRecord, i: int, trial: Trial) -> TrialRow:
         seen = record.lines.get(trial.number, "not executed yet")
         return TrialRow(trial.number, "open", aim, seen, "–", expected, "", "open")
     seen, off, truly_off = say_reading(reading, form), "–", ""
-    if np.all(np.isfinite(reading.low) & np.isfinite(reading.high)):
-        distance = record.distance(reading.error_seen)
+    if (distance := record.distance_seen(trial)) is not None:
         called = CALLED if trial.hit and distance > record.edge else ""
         off = called + say_distance(record, distance)
     state = result = "hit" if trial.hit else "miss"

@@ -101,7 +101,7 @@ class Trial:
     reading: Reading | None = None
     """What was said of it; None unless told."""
     hit: bool = False
-    """Whether the goal was reached: as seen, or judged from `error_seen`."""
+    """Whether the goal was reached: as seen, or judged from the error."""
     note: str = ""
     """Why it was voided."""
     told_before: bool = False
@@ -125,16 +125,18 @@ class Trial:
         said = [f"{self.number} for goal {self.goal_number}", self.stage.value]
         said.append(f"condition {np.round(self.condition, 4).tolist()}")
         if self.error_seen is not None:
-            hit = "hit" if self.hit else "miss"
-            said.append(f"error {np.round(self.error_seen, 4).tolist()}, {hit}")
+            said.append(f"error {np.round(self.error_seen, 4).tolist()}")
+        if self.reading is not None:
+            said.append("hit" if self.hit else "miss")
         if len(self.plan):
             said.append(f"plan {' x '.join(map(str, self.plan.shape))}")
         return f"Trial({', '.join(said)})"
 
     @property
     def error_seen(self) -> Point | None:
-        """The error e tilde, outcome minus goal as perceived; None unless told."""
-        return None if self.reading is None else self.reading.error_seen
+        """The error e tilde, outcome minus goal as perceived; None unless told where it ended."""
+        reading = self.reading
+        return reading.error_seen if reading is not None and reading.has_place else None
 
     @property
     def surprise(self) -> str:

@@ -74,7 +74,19 @@ def test_trials_say_what_was_told(run, afternoon):
     assert direction["said"] == "long, somewhere"
     assert direction["error"][0] > 0
     assert hit["hit"] is True
+    assert (hit["error"], hit["outcome"]) == (None, None)  # nobody said where in the goal
     assert run("trials", afternoon)[1].splitlines()[3].endswith(": reached (hit)")
+
+
+@pytest.mark.parametrize(("told", "hit"), [("miss", False), ("lost", False), ("hit", True)])
+def test_what_was_told_without_a_place_has_no_error_and_no_outcome(run, folder, told, hit):
+    run("goal", folder, "0.9", "0.05")
+    run("ask", folder)
+    run("tell", folder, told)
+    (trial,) = json.loads(run("trials", folder, "--json")[1])
+    assert (trial["hit"], trial["error"], trial["outcome"]) == (hit, None, None)
+    (row,) = csv.DictReader(io.StringIO(run("trials", folder, "--csv")[1]))
+    assert (row["error x [m]"], row["error y [m]"], row["hit"]) == ("", "", str(hit))
 
 
 def test_status_has_all_goals(run, afternoon):

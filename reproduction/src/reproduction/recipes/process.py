@@ -67,11 +67,11 @@ class Process(OfTraining):
 def _kept(result: GoalTrials) -> dict[str, Any]:
     trials = []
     for trial, rollout in zip(result.trials, result.rollouts, strict=True):
-        assert trial.error_seen is not None
+        assert trial.reading is not None
         assert rollout.key_frame is not None
         kept = {
             "condition": trial.condition,
-            "error_seen": trial.error_seen,
+            "error_seen": trial.reading.error_seen,
             "outcome": rollout.outcome,
             "key_state": np.round(rollout.key_frame.state, 6),
         }

@@ -73,9 +73,10 @@ class TrialView(View, frozen=True):
     condition: list[float]
     """The outcome that the generator was asked for."""
     outcome: list[float] | None
-    """Where the object ended, as far as that was told."""
+    """Goal plus `error`."""
     error: list[float] | None
-    """What was seen, outcome minus goal; of a direction alone, what it is taken to be."""
+    """What was seen, outcome minus goal; of a direction alone, what it is taken to be; null too
+    where nothing but a hit, a miss or a loss was told."""
     seen: str | None
     """The same in words."""
     said: str | None
@@ -218,13 +219,11 @@ class AdviceView(View, frozen=True):
 
 def trial_view(now: Standing, trial: Trial) -> TrialView:
     """Return a trial as plain data."""
-    reading, seen, outcome = trial.reading, None, None
+    reading, error, seen = trial.reading, trial.error_seen, None
     p_hit, to_go = trial.expected.p_hit, trial.expected.trials
     file = now.store.plan_file(now.state.plan_files[trial.number])
     if reading is not None:
         seen = say_reading(reading, now.manifest.outcome_format)
-    if reading is not None and reading.has_number:
-        outcome = (now.state.goal_of(trial).goal + reading.error_seen).tolist()
     return TrialView(
         number=trial.number,
         goal=trial.goal_number,
@@ -232,8 +231,8 @@ def trial_view(now: Standing, trial: Trial) -> TrialView:
         line=say_trial(now, trial),
         warning=say_warning(now, trial) or None,
         condition=trial.condition.tolist(),
-        outcome=outcome,
-        error=reading.error_seen.tolist() if reading is not None else None,
+        outcome=None if error is None else (now.state.goal_of(trial).goal + error).tolist(),
+        error=None if error is None else error.tolist(),
         seen=seen,
         said=reading.said or None if reading is not None else None,
         hit=trial.hit if reading is not None else None,
