@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from prior_reinforce.arm.recordings import importer, inspection, npz
 from prior_reinforce.arm.workspace.workspace import Workspace
+from tests.arm.recordings.recorded import lerobot_set, write_outcomes
 from tests.arm.workspace.planar import demonstrations, events_in, recordings
 
 T = np.arange(24) * 0.02
@@ -41,6 +42,13 @@ def in_milliseconds_and_degrees(folder):
         np.savez(
             folder / f"throw_{i}.npz", t=t, q=np.rad2deg(plan), joint_names=["joint1", "joint2"]
         )
+
+
+def shares(folder):
+    """A set of LeRobot's in percent of each joint's range, which may as well be degrees."""
+    shown = demonstrations()
+    lerobot_set(folder, 50, [80 * plan for plan in shown.plans], ["joint1.pos", "joint2.pos"])
+    write_outcomes(folder.parent, {str(i): r for i, r in enumerate(shown.outcomes_seen.tolist())})
 
 
 def test_what_is_unclear_is_taken_only_when_said(run, folder, tmp_path):
@@ -122,6 +130,32 @@ def test_or_agreed_to_at_a_terminal(run, folder, tmp_path, person):
     assert asked[2:] == ['got "y", which is not "yes" in full']
     with Workspace(folder) as workspace:
         np.testing.assert_allclose(workspace.demonstrations.plans, demonstrations().plans)
+
+
+def test_what_only_the_user_knows_is_not_agreed_to(run, tmp_path, monkeypatch, person):
+    monkeypatch.chdir(tmp_path)
+    shares(tmp_path / "throws")
+    run("new", "arm", "--robot", "none")
+    asked = person("yes").asked
+    status, _, err = run("import", "arm", "throws")
+    assert (status, asked) == (2, [])
+    assert err.endswith("import arm throws --units UNIT\n")
+
+
+@pytest.mark.parametrize(
+    ("new", "given"), [((), ("--units", "percent")), (("--action-units", "percent"), ())]
+)
+def test_shares_of_a_range_are_taken_in_where_no_robot_is_named(
+    run, tmp_path, monkeypatch, new, given
+):
+    monkeypatch.chdir(tmp_path)
+    shares(tmp_path / "throws")
+    run("new", "arm", "--robot", "none", *new)
+    status, _, err = run("import", "arm", "throws", *given)
+    assert (status, err) == (0, "")
+    with Workspace(tmp_path / "arm") as workspace:
+        assert workspace.manifest.format.units == ("percent", "percent")
+        assert workspace.demonstrations.plans.max() == pytest.approx(80, abs=1)
 
 
 def test_inspecting_looks_at_recordings_by_names_of_their_own(run, folder, tmp_path):

@@ -224,6 +224,7 @@ def _settle(ambiguities: Unclear, *, at_terminal: bool) -> None:
     try:
         raise_if_ambiguous(ambiguities)
     except UnclearUnitsError as unclear:
-        if at_terminal and agrees(f"{plain(unclear.what)}; is it so?"):
+        can_agree = all(one.guessed for one in ambiguities)
+        if at_terminal and can_agree and agrees(f"{plain(unclear.what)}; is it so?"):
             return
         raise

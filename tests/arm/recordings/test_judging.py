@@ -144,3 +144,28 @@ def test_radians_in_columns_that_say_degrees_are_remarked_on():
     assert select(takes(("j1", "j2"), (1.2, -16), units=[("deg", "deg")])).remarks == ()
     place = takes(("x", "y", "z", "yaw"), (0.4, 0.1, 0.2, 2), units=[("m", "m", "m", "deg")])
     assert select(place).remarks == ()
+
+
+SO101 = ("shoulder_pan.pos", "shoulder_lift.pos", "elbow_flex.pos", "gripper.pos")
+
+
+@pytest.mark.parametrize("most", [53.0, 100.0, 104.0])
+def test_what_may_be_degrees_or_shares_of_a_range_is_never_guessed(most):
+    some = takes(SO101, (20, -most, 40, 70), (-20, 30, 40, 60))
+    (joints, gripper) = select(some, normalised=True).ambiguities
+    assert joints.option == gripper.option == "--units UNIT UNIT UNIT percent"
+    assert not joints.guessed
+    assert all(text in joints.what for text in ("deg", "-100 to 100", "0 to 100", "--robot none"))
+    degrees = select(some, units=["deg", "deg", "deg", "percent"], normalised=True)
+    assert (degrees.units, degrees.ambiguities) == (("rad",) * 3 + ("percent",), ())
+    assert any("-100 to 100" in remark for remark in degrees.remarks)
+
+
+def test_beyond_a_range_are_degrees():
+    (joints, _) = select(takes(SO101, (20, -130, 40, 70)), normalised=True).ambiguities
+    assert (joints.option, joints.guessed) == ("--units deg deg deg percent", True)
+
+
+def test_one_unit_of_a_plan_holds_for_all_joints():
+    found = select(takes(SO101, (20, -53, 40, 70)), plan_units=("percent",), normalised=True)
+    assert (found.units, found.ambiguities) == (("percent",) * 4, ())

@@ -33,10 +33,10 @@ _HARDLY_DEG, _STILL_DEG = 2.0, 0.1
 """Degrees within which a recorded arm hardly moves, and within which a joint is still. Ours."""
 _OF_COUNTS = " ('0.088 deg' for 4096 counts a turn, their middle subtracted in the file)"
 _NOT_DONE, _HARDLY = "which no arm does", "which is hardly a motion"
-_NORMALISED = (
-    ", unless LeRobot recorded shares of each joint's range (-100 to 100, where use_degrees is "
-    "unset): those are no angles; record with use_degrees, or import them as percent into a "
-    "workspace of --robot none"
+_SHARES = (
+    "LeRobot recorded shares of each joint's range (-100 to 100, or 0 to 100, where use_degrees is "
+    "unset): those are no angles; record with use_degrees, or import them with --units percent "
+    "into a workspace made by: prior-reinforce new W --robot none"
 )
 
 
@@ -114,7 +114,7 @@ class Judge:
     fixed: bool
     """Whether the plan says its units."""
     normalised: bool
-    """Whether the recorder also writes shares of each joint's range, -100 to 100."""
+    """Whether the recorder also writes shares of each joint's range: -100 to 100, or 0 to 100."""
 
     @cached_property
     def angles(self) -> list[Belief]:
@@ -257,9 +257,16 @@ class Judge:
         for (unit, doubt), among in groups.items():
             yield unit, doubt, among, max(among, key=lambda one: one.largest)
 
+    @cached_property
+    def _may_be_shares(self) -> bool:
+        """Whether what looks like degrees may as well be shares of each joint's range."""
+        return self.normalised and all(angle.largest <= _MOST_PERCENT for angle in self.angles)
+
     def questions(self) -> list[Ambiguity]:
         """Ask about units, one question for what looks alike, all with one option."""
-        units = list(self._answers.values())
+        asked = {one for one, doubt in self._doubts.items() if doubt.asked}
+        unsure = {one for one in asked if self._may_be_shares and self._answers[one] == "deg"}
+        units = [UNIT if one in unsure else unit for one, unit in self._answers.items()]
         option = _option(units)
         by = ", as --units says," if self.given else ""
         questions = []
@@ -269,8 +276,8 @@ class Judge:
                 seen = f"put its unit in the place of {UNIT}"
                 seen += " ('0.1 percent' if its range is 0 to 1000)" * (unit == "percent")
                 seen += _OF_COUNTS * (unit in TURN and worst not in self._slides)
-            elif doubt.looks == "deg" and self.normalised and worst.largest <= 100:
-                seen += _NORMALISED
+            elif worst in unsure:
+                seen = f"put deg in the place of {UNIT}, unless {_SHARES}"
             what = (
                 f"{say_names([one.name for one in among])} in {unit}{by} would reach "
                 f"{worst.largest:.4g} ({worst.where}), {doubt.why}: {seen}"
@@ -289,9 +296,8 @@ class Judge:
                 why = f"{why} (in {looks} it is one)" if why == _HARDLY else "and arms do not"
                 remarks.append(f"{worst.where} reaches {worst.largest:.4g} {unit}, {why}: {said}")
         degrees = bool(self.angles) and {*map(self._answers.get, self.angles)} == {"deg"}
-        shares = self.normalised and all(angle.largest <= 100 for angle in self.angles)
-        if self.given and degrees and shares and not self.questions():
-            remarks.append(f"degrees, as --units says{_NORMALISED}")
+        if self.given and degrees and self._may_be_shares and not self.questions():
+            remarks.append(f"degrees, as --units says, unless {_SHARES}")
         return remarks, other
 
 

@@ -76,7 +76,8 @@ def select(
 
     Frames with a value that is not finite are dropped, as lost packets are. `joints` and `units`
     are those of `ReadOptions`, `names` and `plan_units` those of `import_demonstrations`; with
-    `normalised`, the recorder also writes shares of each joint's range, -100 to 100.
+    `normalised`, the recorder also writes shares of each joint's range. One of `plan_units` holds
+    for all joints.
 
     InvalidDemonstrationsError if a recording lacks a joint, or too many frames; ConfigurationError
     if names or units are not as many as joints, or units differ.
@@ -90,6 +91,8 @@ def select(
         joints = tuple(names)
     unnamed = names is not None and tuple(names) == joints
     names = tuple(names) if names is not None else joints
+    if plan_units is not None and len(plan_units) == 1:
+        plan_units = tuple(plan_units) * len(names)
     if not joints or len(set(joints)) != len(joints):
         raise ConfigurationError(f"joints must be names that differ, got {list(joints)}")
     given: Given = "" if units is None else "each"

@@ -328,7 +328,9 @@ class Workspace:
         from prior_reinforce.arm.recordings import Preprocessing, Wanted
 
         manifest, form = self.manifest, self.manifest.format
-        names, units = (None, None) if form.names == UNKNOWN else (form.names, form.units)
+        names, units = form.names, form.units
+        if names == UNKNOWN:  # rad is what `new` writes where it was told no unit
+            names, units = None, None if units == ("rad",) else units
         outcome, before = manifest.outcome_format, self.demonstrations if append else None
         how = dataclasses.replace(preprocessing or Preprocessing(), dt=form.dt)
         checks = manifest.robot, manifest.gate, manifest.declared
