@@ -99,6 +99,26 @@ def test_elsewhere_the_workspace_is_named_first(run, folder):
     assert run("status", folder)[0] == 0
 
 
+def test_a_folder_of_recordings_is_taken_for_no_misspelt_workspace(run, folder, tmp_path):
+    (tmp_path / "planarr").mkdir()
+    said = run("import", "planarr")[2]
+    assert "name the workspace first" in said
+    assert "did you mean" not in said
+
+
+def test_without_a_number_a_told_trial_is_amended_and_none_that_waits_is_said(run, within):
+    assert "ask" in run("amend", "5cm long")[2]
+    assert "amend" not in run("tell", "2", "5cm long")[2]
+    assert run("tell", "5cm long")[0] == 0
+    status, _, said = run("tell", "2cm long")
+    assert status == 2
+    assert all(way in said for way in ("no trial waits", "prior-reinforce ask", "amend N"))
+    assert run("ask")[0] == 0
+    assert run("amend", "2cm long")[0] == 0
+    told, waiting = trials_in(within)
+    assert (told.error_seen.tolist(), waiting.open) == ([0.02, 0.0], True)
+
+
 def test_what_the_gate_refuses_is_red_on_a_terminal(monkeypatch, capsys):
     text = "plan refused\n  REFUSE jerk   too much\n  ok     rest   ok is ok\n  WARN   speed  fast"
     print_checked(text)

@@ -14,7 +14,7 @@ import msgspec
 import tyro
 
 from prior_reinforce.arm.workspace.manifest import workspace_around
-from prior_reinforce.arm.workspace.text import next_step
+from prior_reinforce.arm.workspace.text import call, next_step
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.files import check_path
@@ -80,18 +80,30 @@ def _names_workspace(word: str) -> bool:
     return False
 
 
-def trial_and_rest(workspace: Workspace, words: tuple[str, ...]) -> tuple[int, tuple[str, ...]]:
-    """Return the trial that the first word numbers, else the one that waits, and the other words.
+def trial_and_rest(
+    workspace: Workspace, words: tuple[str, ...], *, told: bool = False
+) -> tuple[int, tuple[str, ...]]:
+    """Return the trial that the first word numbers, and the other words.
+
+    Where it is no number, the trial that waits; or, with `told`, the latest that was told.
 
     Raises:
-        ConfigurationError: None is numbered, and none waits.
+        ConfigurationError: None is numbered, and there is no such trial.
     """
     if words and re.fullmatch(r"-?\d{1,9}", words[0], re.ASCII):
         return int(words[0]), words[1:]
-    waiting = workspace.state.open_trial
-    if waiting is None:
-        raise ConfigurationError("no trial waits; say which one: its number comes first")
-    return waiting.number, words
+    state, folder = workspace.state, workspace.folder
+    latest = next((trial for trial in reversed(state.trials) if trial.amendable), None)
+    trial = latest if told else state.open_trial
+    if trial is not None:
+        return trial.number, words
+    ask = call(folder, "ask")
+    if told:
+        raise ConfigurationError(f"no trial was told yet; tell one, or get a plan: {ask}")
+    others = "" if latest is None else f"; to correct a told one: {call(folder, 'amend', 'N')} ..."
+    raise ConfigurationError(
+        f"no trial waits; get the next plan: {ask}{others}; or put a trial's number first"
+    )
 
 
 def options_of(given: Any, without: Collection[str] = ()) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 import tyro
@@ -35,9 +35,10 @@ class Seen(OnWorkspace):
     """A trial and its result."""
 
     words: Annotated[Words, tyro.conf.arg(metavar="[WORKSPACE] [TRIAL] [SEEN]")] = ()
-    """The workspace (the current folder's if not given), the trial's number (the one that waits if
-    not given), and what was seen, outcome minus goal: "5cm long, 2cm left", "5.2 +- 0.3 cm long",
-    "long", "hit", "miss"; or a number for each component, in its own unit: 0.05 -0.02,
+    """The workspace (the current folder's if not given), the trial's number (if not given, the one
+    that waits, or to `amend` the latest that was told), and what was seen, outcome minus goal:
+    "5cm long, 2cm left", "5.2 +- 0.3 cm long", "long", "hit", "miss", "lost" (a miss that nobody
+    saw land); or a number for each component, in its own unit: 0.05 -0.02,
     0.05+-0.003 0.02+-0.003."""
     error: Annotated[tuple[str, ...] | None, tyro.conf.arg(metavar="SEEN")] = None
     """What was seen, as a named option."""
@@ -50,12 +51,14 @@ class Seen(OnWorkspace):
     """The goal was not reached, whatever the distance says."""
 
     takes_words = True
+    of_told: ClassVar[bool] = False
+    """Whether it is about a trial that was told, not about one that waits."""
 
     def read(
         self, workspace: Workspace, words: tuple[str, ...]
     ) -> tuple[int, Reading | Point | None, bool | None]:
         """Return the trial's number, what was seen and whether it hit, as for `Session.tell`."""
-        number, seen = trial_and_rest(workspace, words)
+        number, seen = trial_and_rest(workspace, words, told=self.of_told)
         given = [bool(seen), self.error is not None, self.outcome is not None]
         if sum(given) > 1:
             raise ConfigurationError(
@@ -99,7 +102,10 @@ class Amend(Seen):
 
     For example:
         prior-reinforce amend hoop 3 "5cm short"
+        prior-reinforce amend "5cm short"
     """
+
+    of_told = True
 
     def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
         number, seen, hit = self.read(workspace, words)

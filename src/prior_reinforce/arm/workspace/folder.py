@@ -59,6 +59,6 @@ def _meant(folder: Path) -> str:
     """What to do where a folder is no workspace: another name beside it, or a new one."""
     there = [path.parent.name for path in folder.parent.glob(f"*/{MANIFEST_FILE}")]
     closest = difflib.get_close_matches(folder.name, there, n=1)
-    if closest:
+    if closest and not folder.exists():  # what exists is no misspelt name
         return f"; did you mean {folder.with_name(closest[0])}?"
-    return "; give a workspace's folder, or make one with: prior-reinforce new WORKSPACE"
+    return "; name the workspace first, or make one with: prior-reinforce new WORKSPACE"
