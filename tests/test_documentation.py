@@ -34,7 +34,7 @@ def run(*command, cwd):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["demonstrations.md", "robots.md"])
+@pytest.mark.parametrize("name", ["demonstrations.md", "robots.md", "symmetry.md"])
 def test_the_examples_of_the_guides_run(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     namespace = {}

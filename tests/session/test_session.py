@@ -587,6 +587,11 @@ def test_bad_tolerances_are_named(tolerance):
         Session(RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, GOAL, tolerance)
 
 
+def test_a_tolerance_that_nobody_gave_is_asked_for():
+    with pytest.raises(ConfigurationError, match="give tolerance="):
+        Session(RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS, GOAL)
+
+
 def test_one_number_for_several_units_is_refused():
     generator = RepeatingGenerator().fit(MIXED, seed=0)
     with pytest.raises(ConfigurationError, match=r"several units; give one for each of .* \[s\]"):

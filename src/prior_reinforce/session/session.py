@@ -193,7 +193,11 @@ class Session:
         form, shown = demonstrations.outcome_format, demonstrations.outcomes_seen
         checked = demonstrations.check_goal(as_place(goal, form, shown))
         given = self._tolerance if tolerance is None else tolerance
-        form = form.within(() if given is None else given)
+        if given is None:
+            raise ConfigurationError(
+                f"give tolerance=, the largest error that is a hit: one number, or one for {form}"
+            )
+        form = form.within(given)
         carried = self._carry_over if carry_over is None else carry_over
         if carried is None:
             if adapter:

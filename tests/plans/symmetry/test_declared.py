@@ -145,7 +145,11 @@ def test_neither_leaves_a_scaling_of_one_outcome():
     ("form", "k", "said", "message"),
     [
         (JOINTS, 2, {}, "needs an axis"),
-        (JOINTS, 2, {"about": "base"}, "name the arm"),
+        (JOINTS, 2, {"about": "base"}, r"name the arm .*chain=robot_limits\('ur5e'\).chain"),
+        (JOINTS, 2, {"about": "carried", **ARM}, r"'base' .*\(x, y\).*None.*got 'carried'"),
+        (JOINTS, 2, {"about": (0.4, 0.0, 0.1), **ARM}, r"'base' .*\(x, y\)"),
+        (JOINTS, 2, {"about": ("a", "b"), **ARM}, r"'base' .*\(x, y\)"),
+        (JOINTS, 2, {"about": (float("nan"), 0.0), **ARM}, r"'base' .*\(x, y\)"),
         (JOINTS, 2, {"distance": "shift"}, "needs plans with x and y"),
         (JOINTS, 3, {"about": "base", **ARM}, "outcomes have 3 components"),
         (JOINTS, 1, {"steps": ["hand"]}, r"steps names \['hand'\]"),

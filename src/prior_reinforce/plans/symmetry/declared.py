@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Sequence
+from contextlib import suppress
 from typing import Literal
 
 import numpy as np
@@ -135,7 +136,7 @@ def declare_symmetry(
             "distance = 'learned' (several demonstrations tell all but the bearing), leave the "
             "symmetry out, or make one of moves for each (plans.symmetry)"
         )
-    centre = (0.0, 0.0) if about == "base" else (float(about[0]), float(about[1]))
+    centre = _centre(about)
     if chain is not None and joints:
         if about != "base" and not _on_first_axis(chain, centre):
             path = TurnPath(chain, centre, tuple(joints), tuple(ranges) or UNSET)
@@ -165,8 +166,29 @@ def declare_symmetry(
         turn = TurnIncrements(start, centre, (place[0], place[1]), column.get("dyaw"), _LEAD)
         return turn_and_scale(turn, centre, scale, others)
     raise ConfigurationError(
-        f"plans of {', '.join(form.names)} cannot be turned: name the arm, or give poses x and y"
+        f"plans of {', '.join(form.names)} cannot be turned: name the arm ([robot]; in Python "
+        "chain=robot_limits('ur5e').chain, or arm.robots.urdf.read_urdf(path).chain, and the "
+        "columns of its joints, joints=range(6)), or give poses x and y"
     )
+
+
+def _centre(about: object) -> tuple[float, float]:
+    """The place that a motion is turned about, [m].
+
+    Raises:
+        ConfigurationError: It is none.
+    """
+    if about == "base":
+        return 0.0, 0.0
+    place = np.empty(0)
+    with suppress(TypeError, ValueError):
+        place = np.array(about, dtype=np.float64)
+    if place.shape != (2,) or not np.isfinite(place).all():
+        raise ConfigurationError(
+            f"about is 'base' (the arm carries the object), the place (x, y) in metres where the "
+            f"object lies, or None (no turn), got {about!r}"
+        )
+    return float(place[0]), float(place[1])
 
 
 def _columns(column: dict[str, int], names: Sequence[str]) -> Columns:
