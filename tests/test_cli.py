@@ -140,6 +140,8 @@ def test_every_help_has_an_example_and_says_no_none(capsys, name):
     assert f"    prior-reinforce {name} " in shown
     for empty in ("{None}", "(default: None)", "(default: False)", "(default: )", "\0"):
         assert empty not in shown
+    for flag in {*re.findall(r"^ +(--no-[\w-]+)", shown, re.MULTILINE)} - {"--no-box"}:
+        assert f"`{flag}`" in shown  # what is said is of the flag, not of the field behind it
     if "[WORKSPACE]" in shown:
         assert "WORKSPACE" in shown.partition("\n\n")[0]
 

@@ -158,6 +158,13 @@ def test_shares_of_a_range_are_taken_in_where_no_robot_is_named(
         assert workspace.demonstrations.plans.max() == pytest.approx(80, abs=1)
 
 
+def test_a_single_recording_is_one_episode(run, folder, tmp_path):
+    recordings(tmp_path / "own")
+    for path in {*(tmp_path / "own").iterdir()} - {tmp_path / "own" / "throw_0.npz"}:
+        path.unlink()
+    assert "own: 1 episode\n" in run("import", folder, "own", "--inspect")[1]
+
+
 def test_inspecting_looks_at_recordings_by_names_of_their_own(run, folder, tmp_path):
     recordings(tmp_path / "own")
     for path in (tmp_path / "own").glob("*.npz"):

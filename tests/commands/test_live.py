@@ -16,6 +16,7 @@ from prior_reinforce.commands.live import (
     goals_reached,
     say,
 )
+from prior_reinforce.errors import WorkspaceError
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.generators.base import FitProgress
 from prior_reinforce.readings import Reading
@@ -115,6 +116,13 @@ def test_a_fit_shows_its_loss_and_the_time_left(monkeypatch):
         progress(FitProgress(step=5, n_steps=10, loss=0.25, seconds_left=12.0))
     assert shown[0] == {"total": 10, "completed": 5, "detail": "loss 0.2500, 12 s left"}
     assert shown[-1]["detail"] == "done"
+
+
+def test_a_fit_that_cannot_be_leaves_no_bar():
+    console = Console(file=io.StringIO(), width=80)
+    with pytest.raises(WorkspaceError), fit_progress(console):
+        raise WorkspaceError("there are no demonstrations")
+    assert not console.file.getvalue().strip()
 
 
 def test_names_and_reasons_are_printed_as_they_are(capsys):

@@ -29,7 +29,7 @@ GROUPS: dict[str, dict[str, tuple[str, str]]] = {
         "look": ("photographs:Look", "see a trial's error in a photograph"),
     },
     "simulated tasks": {
-        "demo": ("simulated:Demo", "six demonstrations, five new goals, a report"),
+        "demo": ("simulated:Demo", "one demonstration, five new goals, a report"),
         "adapt": ("simulated:Adapt", "reach new goals, trial by trial"),
     },
 }

@@ -49,6 +49,7 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.files import check_path, named_disk_errors
 from prior_reinforce.terminal import plain
+from prior_reinforce.wording import say_count
 
 Unclear = tuple[Ambiguity, ...]
 """What is only guessed of units, times and names."""
@@ -77,7 +78,7 @@ class Import(OnWorkspace):
     horizon: int | None = None
     """Frames of every plan; the longest recording's if not given."""
     trim: bool = True
-    """Drop the still ends of each recording; `--no-trim` keeps them."""
+    """`--no-trim` keeps the still ends of each recording, which are else dropped."""
     smooth: float | None = None
     """Low-pass frequency in Hz, against encoder noise; the preview reports what it changed."""
 
@@ -200,7 +201,7 @@ class Import(OnWorkspace):
             )
             print_json(record)
             return
-        print(f"{recordings.source}: {len(found.recordings)} episodes")
+        print(f"{recordings.source}: {say_count(len(found.recordings), 'episode')}")
         print_checked(found.text)
         print(plain(f"\noutcomes: {said}", keep="\n"))
         print(f"nothing was taken in; next: {command}")

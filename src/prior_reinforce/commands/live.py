@@ -15,7 +15,7 @@ from rich.text import Text
 
 from prior_reinforce.arrays import Point
 from prior_reinforce.commands.questions import answer_to, until_read
-from prior_reinforce.errors import PerceptionFailedError
+from prior_reinforce.errors import PerceptionFailedError, PriorReinforceError
 from prior_reinforce.parsing import from_words
 from prior_reinforce.readings import Reading
 from prior_reinforce.terminal import plain
@@ -153,7 +153,11 @@ def fit_progress(console: Console) -> Iterator[Callable[[FitProgress], None]]:
             detail = f"loss {state.loss:.4f}, {state.seconds_left:.0f} s left"
             progress.update(line, total=state.n_steps, completed=state.step, detail=detail)
 
-        yield show
+        try:
+            yield show
+        except PriorReinforceError:  # which says why nothing was learned
+            progress.remove_task(line)
+            raise
         progress.update(line, detail="done")
 
 

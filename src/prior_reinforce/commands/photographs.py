@@ -145,9 +145,10 @@ class Look:
     goal_size: float
     """Longer side of a box around it, in [m]."""
     reached_round: bool = True
-    """Whether what flew looks as wide from all sides: a flatter box then shows a part of it."""
+    """`--no-reached-round`: what flew is not as wide from all sides; else a flatter box is taken
+    for a part of it."""
     goal_round: bool = True
-    """The same of what stands at the goal."""
+    """`--no-goal-round`: the same of what stands at the goal."""
     goal_offset: tuple[float, float] = (0.0, 0.0)
     """From that object's centre to the goal, forward and left, in [m]."""
     camera: str | None = None

@@ -90,7 +90,7 @@ class _Reaching:
     perception: PerceptionChoice = "eye"
     vlm: Vlm = None
     film: bool = True
-    """Draw the last trial of each goal as a film."""
+    """`--no-film` draws no film of the last trial of each goal."""
     seed: int = 0
     """Seed of training, goals, disturbances and perception."""
 
@@ -275,8 +275,8 @@ class Demo(_Reaching):
     goals: int = 5
     """Number of unseen goals."""
     six: bool = True
-    """Also reach the goals as in the paper: from six demonstrations, without symmetry, and by a
-    Gaussian process."""
+    """`--no-six` does without the paper's way beside it: the same goals from six demonstrations,
+    without symmetry, by a Gaussian process."""
 
     def run(self) -> int:
         """See one demonstration, adapt; the same with six; report."""
