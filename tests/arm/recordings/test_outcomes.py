@@ -80,6 +80,16 @@ def test_centimetres_in_a_columns_name_are_converted(tmp_path):
     assert outcomes.units == ("m", "m", "m", None)
 
 
+def test_a_column_of_words_is_a_note_and_no_outcome(tmp_path):
+    text = "Wurf;vorne (cm);links (cm);Bemerkung\nWurf 1;79,4;-2,5;gut\nWurf 2;81,9;5,2;zu kurz\n"
+    found = read_outcomes(table(tmp_path, text), ("x", "y"))
+    assert found.names == ("vorne", "links")
+    with pytest.raises(
+        InvalidDemonstrationsError, match=r"no column x, y; it has vorne, links: re"
+    ):
+        found.only(("x", "y"))
+
+
 def test_columns_in_another_order_are_matched_by_name(recording, tmp_path):
     lines = ["y,episode,x"] + [f"{y},{name},{x}" for name, (x, y) in OUTCOMES.items()]
     path = table(tmp_path, "\n".join(lines))

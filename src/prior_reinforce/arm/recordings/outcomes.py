@@ -200,7 +200,8 @@ def key_column(table: Table) -> int | None:
 def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
     """Read a table of outcomes, a CSV of any dialect; rows with empty cells are skipped.
 
-    `names` are the components wanted; None takes all columns but the index and notes.
+    `names` are the components wanted; None takes all columns but the index and notes, which are
+    also what has no digit in it, by whatever name.
     FileFormatError if it is no such table, or a cell is no number.
     """
     example = "episode,x,y"
@@ -214,8 +215,8 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
     lower = [name.lower() for name, _ in split]
     key = key_column(table)
     other = (*_NOT_COMPONENTS, *ROW_COLUMNS)
-    files = [i for i, cells in enumerate(table.cells) if cells and all(map(FILE.fullmatch, cells))]
-    columns = [i for i, name in enumerate(lower) if i not in (key, *files) and name not in other]
+    texts = [i for i, cells in enumerate(table.cells) if cells and _is_text(cells)]
+    columns = [i for i, name in enumerate(lower) if i not in (key, *texts) and name not in other]
     meant = columns_of(names or (), [split[i][0] for i in columns])
     if meant and all(meant.values()):  # others may hold anything
         own = {i for each in meant.values() for i, _ in each}
@@ -271,6 +272,12 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
         scale=tuple(scale),
         remarks=(f"{path}: {', '.join(left_out)} left out",) * bool(left_out),
     )
+
+
+def _is_text(cells: Sequence[str]) -> bool:
+    """Whether a column holds files, or notes: no outcome."""
+    notes = any(cells) and not any(map(re.compile(r"\d|(?i:nan|inf)").search, cells))
+    return notes or all(map(FILE.fullmatch, cells))
 
 
 def _doubt_thousands(table: Table, columns: Mapping[int, str | None]) -> None:
