@@ -26,7 +26,10 @@ def test_every_unit_is_spelt_in_its_own_way_and_converts_to_its_base():
         assert next(iter(units_of(kind).items())) == (base, 1.0)
 
 
-@pytest.mark.parametrize(("text", "unit"), [("°", "deg"), ("Inches", "in"), ("counts", None)])
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [("°", "deg"), ("Inches", "in"), ("Degrés", "deg"), ("Grad", None), ("counts", None)],
+)
 def test_spellings(text, unit):
     assert spelt(text) == unit
 

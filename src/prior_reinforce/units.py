@@ -55,11 +55,14 @@ UNITS: Mapping[str, Unit] = {
     ),
     "in": Unit(kind="length", factor=0.0254, plural="inches", spellings='inch "'),
     "rad": Unit(
-        kind="angle", factor=1.0, plural="radians", spellings="radian",
+        kind="angle", factor=1.0, plural="radians",
+        spellings="radian radiant radianti radianes bogenmaß bogenmass",
         largest=7.0, error_limit=math.pi, spoken="deg", small="mrad",
     ),
+    # Not `grad`, which is a degree in German and a gradian elsewhere.
     "deg": Unit(
-        kind="angle", factor=math.pi / 180, plural="degrees", spellings="degree °", largest=720.0
+        kind="angle", factor=math.pi / 180, plural="degrees",
+        spellings="degree ° gradi grado grados degré degrés", largest=720.0,
     ),
     "s": Unit(
         kind="time", factor=1.0, plural="seconds", spellings="sec secs second", spoken="ms"
@@ -85,7 +88,7 @@ UNITS: Mapping[str, Unit] = {
     "share": Unit(kind="share", factor=1.0, plural="shares", spellings="fraction"),
     "rev": Unit(
         kind="angle", factor=2 * math.pi, plural="revolutions",
-        spellings="revs revolution turn turns",
+        spellings="revs revolution turn turns umdrehung umdrehungen",
     ),
     "mrad": Unit(
         kind="angle", factor=1e-3, plural="milliradians", spellings="milliradian"

@@ -98,7 +98,15 @@ def test_a_unit_that_is_listed_nowhere_is_not_taken_for_another_such_one():
     with pytest.raises(ConfigurationError, match="is in bar, but --units says psi"):
         select(takes(("valve",), [3.0], units=[("bar",)]), units=["psi"])
     (remark,) = select(takes(("pan",), [30.0], units=[("Grad",)]), units=["deg"]).remarks
-    assert "pan is in Grad in t0, taken for deg" in remark
+    assert "pan recorded in Grad in t0, taken for deg" in remark
+
+
+def test_joints_in_one_unknown_word_are_one_remark():
+    told = takes(("j1", "j2", "j3"), [30.0, 20.0, 40.0], units=[("Grad",) * 3])
+    (remark,) = select(told, units=["deg"]).remarks
+    assert remark.startswith("j1 to j3 recorded in Grad in t0, taken for deg")
+    with pytest.raises(ConfigurationError, match=r"in Grad, but .* --units deg"):
+        select(told, plan_units=("rad",) * 3)
 
 
 T = np.linspace(0, 1, 40)

@@ -62,7 +62,8 @@ def in_one_unit(
     if two files state units of which one cannot be converted.
     """
     scale, stated = np.ones((len(recordings), len(names))), list[str | None]()
-    remarks, doubts = [], []
+    remarks, doubts = list[str](), []
+    words: dict[tuple[str, str, str], list[str]] = {}
     for i, (name, unit) in enumerate(zip(names, given, strict=True)):
         takes: dict[str, list[Recording]] = {}
         for recording in recordings:
@@ -77,7 +78,7 @@ def in_one_unit(
             is_word = by is None and not spelt(without_number(own)[0])
             if is_word and said is not None and spelt(said):
                 by = 1.0  # `Grad`, which is no listed unit
-                remarks.append(f"{name} is in {own} in {called[own]}, taken for {said}, as said")
+                words.setdefault((own, called[own], said), []).append(name)
             elif said not in (None, own):
                 raise ConfigurationError(
                     f"{of_unit[0].columns[i]} of episode {of_unit[0].episode} is in {own}, but "
@@ -106,7 +107,11 @@ def in_one_unit(
         replace(r, positions=r.positions * by) if np.any(by != 1) else r
         for r, by in zip(recordings, scale, strict=True)
     ]
-    return scaled, stated, remarks, doubts
+    as_said = [
+        f"{say_names(of)} recorded in {own} in {where}, taken for {said}, as said"
+        for (own, where, said), of in words.items()
+    ]
+    return scaled, stated, [*as_said, *remarks], doubts
 
 
 def _called(recordings: Sequence[Recording]) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from prior_reinforce.errors import ConfigurationError, UnclearUnitsError
-from prior_reinforce.units import STATED, UNITS, factor, spelt, units_of, without_number
+from prior_reinforce.units import STATED, UNITS, factor, spelt, spoken, units_of, without_number
 from prior_reinforce.wording import listed
 
 SECONDS = units_of("time")
@@ -108,9 +108,11 @@ def conversion(recorded: str, wanted: str, name: str) -> float:
     """Return the factor from one unit to another; ConfigurationError if there is none."""
     scale = factor(recorded, wanted)
     if scale is None:
+        is_word = not spelt(without_number(recorded)[0]) and bool(re.search("[A-Za-z]", recorded))
+        example = f"--units {spoken(wanted)[0]}" if is_word else "--units '0.01 deg'"
         raise ConfigurationError(
-            f"{name} is recorded in {recorded}, but plans are in {wanted}; say its unit with "
-            "--units, such as '0.01 deg', or correct the plan's units"
+            f"{name} is recorded in {recorded}, but plans are in {wanted}; say its unit, such as "
+            f"{example}, or correct the plan's units"
         )
     return scale
 
