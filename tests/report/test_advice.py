@@ -1,9 +1,11 @@
 """The picture of what an adapter knows."""
 
 import numpy as np
+import pytest
 from PIL import Image
 
 from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.generators.reach import Reach
 from prior_reinforce.report import advice
 from prior_reinforce.report.advice import draw_advice
 
@@ -20,11 +22,27 @@ def test_where_a_first_throw_hits_is_dark(tmp_path):
     assert pictures[0] > pictures[1] + 20
 
 
-def test_what_the_shades_and_the_axes_mean_is_said(tmp_path, monkeypatch):
-    figures = []
+@pytest.fixture
+def figures(monkeypatch):
+    """Figures that were drawn."""
+    drawn = []
     monkeypatch.setattr(
-        advice.style, "save_figure", lambda figure, path: figures.append(figure) or path
+        advice.style, "save_figure", lambda figure, path: drawn.append(figure) or path
     )
+    return drawn
+
+
+def test_what_is_out_of_reach_is_drawn_beside_what_is_not(tmp_path, figures):
+    grid = np.stack(np.meshgrid([0.8, 0.9, 1.0], [-0.2, 0.0, 0.2, 0.4], indexing="ij"), -1)
+    some = Reach(grid, np.array([[True] * 4, [True] * 4, [False] * 4]))
+    draw_advice(tmp_path / "a.png", OutcomeFormat.metres(2), grid[0], some)
+    (axes,) = figures[0].axes
+    labels = axes.get_legend_handles_labels()[1]
+    assert "can be reached" in labels
+    assert "hatched: out of reach, 33% of the goals" in labels
+
+
+def test_what_the_shades_and_the_axes_mean_is_said(tmp_path, figures):
     grid = np.stack(np.meshgrid([0.8, 0.9, 1.0], [-0.2, 0.2], indexing="ij"), -1).reshape(-1, 2)
     draw_advice(
         tmp_path / "a.png", OutcomeFormat.metres(2), grid[:2], goals=grid,

@@ -76,9 +76,10 @@ def draw_advice(
             axes.contourf(*at, inside, levels=(0.5, 1.5), colors=[style.HIT], alpha=0.25)
             marks += [(np.zeros((1, 2)), "s", 42, style.INK_SOFT, "robot's base")]
             axes.fill([], [], color=style.HIT, alpha=0.25, label="can be reached")
-        elif not reached.reached.all():
+        if not reached.reached.all():
             axes.contourf(*at, inside, levels=(-0.5, 0.5), colors="none", hatches=["///"])
-            axes.plot([], [], color=style.INK_SOFT, label="hatched: out of reach")
+            share = f"hatched: out of reach, {1 - inside.mean():.0%} of the goals"
+            axes.plot([], [], color=style.INK_SOFT, label=share)
     if demonstration is not None:  # the diamond fits into the star, for both are often at one place
         shown = scale * demonstration[None]
         marks.append((shown, "D", 26, style.HIT, "demonstration that teaches most"))
