@@ -719,6 +719,18 @@ def test_an_event_is_drawn_once(at, serve):
     assert page.evaluate("window.drawn") == 1
 
 
+def test_a_bare_hit_is_said_once_and_a_goal_that_was_given_up_is_not_on_the_map(at, serve):
+    served = serve()
+    with Workspace(served.folder) as workspace:
+        for goal in ([0.9, 0.05], [0.85, 0.0]):
+            workspace.set_goal(goal)
+        workspace.session().tell(workspace.session().ask().number, "hit")
+        workspace.set_goal([0.95, -0.05])
+    page = at(served)
+    expect(page.locator("#history")).to_contain_text("✓ hit (a hit was")
+    expect(page.locator("#map path.goal")).to_have_count(2)  # that of now, and that was thrown at
+
+
 def test_words_by_eye_then_a_correction_and_a_void(at, serve, tmp_path):
     served, page = executed(at, serve)
     page.locator("#eye-0-5").check(force=True)

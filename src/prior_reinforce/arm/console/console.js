@@ -430,7 +430,7 @@ function drawMap() {
   }
   for (const goal of S.goals) {
     const now = goal.number === S.goals.length;
-    if (!now && S.goals.length - goal.number > 30) continue;
+    if (!now && (goal.told === 0 || S.goals.length - goal.number > 30)) continue;  // given up, or long ago
     const [u, v] = uv(xy(goal.goal));
     const [along, across] = xy(goal.tolerance);
     if (now) parts.push(g("ellipse", { class: "goal ring", cx: u, cy: v, rx: 1000 * across, ry: 1000 * along }));
@@ -901,11 +901,15 @@ function drawPlan() {
 // --- the history ------------------------------------------------------------------------------
 
 const SHOWN = 12;
+function sayTrial(trial) {
+  if (!trial.hit) return trial.seen || trial.line;
+  return trial.error ? `✓ hit, ${trial.seen}` : "✓ hit";
+}
 function drawHistory() {
   if (!S.trials.length) { fill("history"); return; }
   const trials = [...S.trials].reverse();
   const row = (trial) => h("li", {}, h("div", { class: "entry" }, h("b", {}, `${trial.number}`),
-    h("span", { class: trial.hit ? "hit" : "" }, `${trial.hit ? "✓ hit, " : ""}${trial.seen || trial.line}${trial.p_hit !== null && trial.stage === "told" ? ` (a hit was ${trial.chance})` : ""}`),
+    h("span", { class: trial.hit ? "hit" : "" }, `${sayTrial(trial)}${trial.p_hit !== null && trial.stage === "told" ? ` (a hit was ${trial.chance})` : ""}`),
     trial.stage === "told" && button(`amend-${trial.number}`, "Correct", () => { L.amending = trial.number; L.mark = trial.outcome; draw(); (mapped() ? $("map") : rulers[0].svg).focus(); }, "plain", { "aria-label": `Correct trial ${trial.number}` }),
     trial.stage === "told" && L.voiding !== trial.number && button(`undo-${trial.number}`, "Void", () => { L.voiding = trial.number; draw(); }, "plain", { "aria-label": `Void trial ${trial.number}` })),
     trial.stage === "told" && !L.amending && confirmVoid(trial.number));
