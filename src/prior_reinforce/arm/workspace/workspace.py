@@ -328,9 +328,11 @@ class Workspace:
         from prior_reinforce.arm.recordings import Preprocessing, Wanted
 
         manifest, form = self.manifest, self.manifest.format
-        names, units = form.names, form.units
-        if names == UNKNOWN:  # rad is what `new` writes where it was told no unit
-            names, units = None, None if units == ("rad",) else units
+        unknown = form.names == UNKNOWN
+        names = None if unknown else form.names
+        units = (
+            None if unknown and form.units == ("rad",) else form.units
+        )  # rad: `new` was told none
         outcome, before = manifest.outcome_format, self.demonstrations if append else None
         how = dataclasses.replace(preprocessing or Preprocessing(), dt=form.dt)
         checks = manifest.robot, manifest.gate, manifest.declared
