@@ -27,15 +27,18 @@ TASKS = ("basketball-v1", "zoo-lob", "zoo-scoop", "zoo-bounce", "zoo-strike", "z
 GENERATORS = ("auto,symmetry=none", "auto")
 
 
-def tried(task: str, number: int, arguments: argparse.Namespace, folder: Path) -> tuple[bool, list]:
+def tried(
+    task: str, number: int, arguments: argparse.Namespace, folder: Path
+) -> tuple[bool, list[tuple[float, float]]]:
     """Whether a turn was found on a set, and with each generator the mean of hits and trials."""
     name = f"mixed-8-{number}" if task.startswith("zoo-") else DRAWN[number]
-    subset, means = tuple(range(arguments.count)), []
+    subset = tuple(range(arguments.count))
+    means = list[tuple[float, float]]()
     for generator in GENERATORS:
         training = Shown(task, name, generator, number, subset, symmetry="none")
         trials = Trials(training, task, "bayes", arguments.perception, arguments.goals)
         used = np.array([result.solved_at or 11 for result in trials.trials(folder)])
-        means.append((np.mean(used == 1), used.mean()))
+        means.append((float(np.mean(used == 1)), float(used.mean())))
     return find_turn(training.recorded().only(subset)) is not None, means
 
 
