@@ -18,6 +18,7 @@ from prior_reinforce.plans.symmetry import (
     shift,
     turn_and_scale,
 )
+from prior_reinforce.simulation.tasks import make_task
 from prior_reinforce.testing import synthetic_demonstrations
 
 TURN = turn_and_scale(TurnJoint(2), scale=Tempo(exponent=1.0))
@@ -141,6 +142,24 @@ def test_without_a_symmetry_it_is_the_generator_that_it_wraps(throws):
     goals = demos.outcomes_seen[:2] + 0.01
     np.testing.assert_array_equal(layered.generate(goals), bare.generate(goals))
     assert layered.remarks == bare.remarks
+
+
+def test_auto_finds_the_turn_that_throws_show(tmp_path):
+    shown = make_task("basketball-v1").demonstrations("A").without_symmetry()
+    made = make_generator("auto").fit(shown, seed=0)
+    assert "joint1 turns with the outcome's bearing" in made.remarks[0]
+    goal, angle = np.array([1.0, 0.05]), 0.7  # turned by that, far outside the hull
+    cos, sin = np.cos(angle), np.sin(angle)
+    goals = np.stack([goal, [[cos, -sin], [sin, cos]] @ goal])
+    plan, turned = made.generate(goals)
+    np.testing.assert_allclose(turned - plan, [[angle, *[0.0] * 6]] * len(plan), atol=1e-9)
+    made.save(tmp_path)
+    loaded = load_generator(tmp_path)
+    np.testing.assert_array_equal(loaded.generate(goals), made.generate(goals))
+    assert repr(made) == "Equivariant(Auto(Timed(SmoothInterpolation(fitted))))"
+    for choice in ("auto,symmetry=none", "interpolation,symmetry=use"):
+        other = make_generator(choice).fit(shown, seed=0)
+        assert not any("bearing" in remark for remark in other.remarks)
 
 
 def test_the_switch_gives_what_is_learned_from_demonstrations_alone(throws):

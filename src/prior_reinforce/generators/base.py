@@ -257,6 +257,10 @@ class Wrapper(Generator):
             inner = inner.generator
         self.generator = generator
 
+    def __repr__(self) -> str:
+        """Class, and what is wrapped: of `auto`, what it chose."""
+        return f"{type(self).__name__}({self.generator!r})"
+
     def fit(
         self, demonstrations: Demonstrations, *, seed: int, progress: OnProgress | None = None
     ) -> Self:
