@@ -9,8 +9,10 @@ from prior_reinforce.units import (
     base_of,
     factor,
     in_unit,
+    is_force,
     kind_of,
     looks_like,
+    per_time,
     spelt,
     spoken,
     units_of,
@@ -46,6 +48,26 @@ def test_units_of_one_kind_convert():
         ("N", 1),
     )
     assert (kind_of("us"), kind_of("N")) == ("time", "N")
+
+
+@pytest.mark.parametrize(
+    ("powers", "units"),
+    [
+        (0, ("m", "s", "steps", "m/step", "percent", "N")),
+        (
+            1,
+            ("rad/s", "rad/sec", "m/sec", "mm/min", "rpm", "rad s^-1", "rad s⁻¹", "°/s", "m per s"),
+        ),
+        (2, ("m/s^2", "m/s²", "m/s/s", "rad s-2")),
+    ],
+)
+def test_rates_and_accelerations_are_told_by_their_units(powers, units):
+    assert {unit: per_time(unit) for unit in units} == dict.fromkeys(units, powers)
+
+
+def test_forces_and_torques_are_told_by_their_units():
+    assert all(map(is_force, ("N", "Nm", "N m", "N·m", "mNm", "kN", "N cm")))
+    assert not any(map(is_force, ("m", "min", "in", "1", "rad")))
 
 
 def test_people_say_centimetres_milliseconds_and_degrees():

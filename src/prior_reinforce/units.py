@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
@@ -102,6 +103,10 @@ SPELT = {
 """Unit by each of its spellings, in lower case."""
 
 
+_TIME = f"({'|'.join(spelling for spelling, name in SPELT.items() if UNITS[name].kind == 'time')})"
+_PER_TIME = re.compile(rf"(/|\bper) *\(?{_TIME}(?![a-z])\^?(?P<over>\d?)|\W{_TIME}\^?-(?P<up>\d)")
+_RATE = re.compile("rpm|rps|dps")
+_FORCE = re.compile(r"[km]?n\W?([cm]?m)?")
 _NUMBERED = re.compile(r"(\d*\.?\d+) *([^\d\s.].*)")
 """A number before a unit: a motor's `0.01 deg`."""
 
@@ -125,6 +130,23 @@ def kind_of(unit: str) -> str:
     """Return what a unit measures; the unit itself if it is not listed."""
     name, _ = without_number(unit)
     return UNITS[name].kind if name in UNITS else unit
+
+
+def per_time(unit: str) -> int:
+    """Return how often a unit is divided by time: 0 for m, 1 for rad s^-1 and rpm, 2 for m/s^2."""
+    text = _plain(unit)
+    powers = [int(match["over"] or match["up"] or 1) for match in _PER_TIME.finditer(text)]
+    return 1 if _RATE.fullmatch(text) else sum(powers)
+
+
+def is_force(unit: str) -> bool:
+    """Whether a unit is of forces or torques: N, Nm, N cm."""
+    return _FORCE.fullmatch(_plain(unit)) is not None
+
+
+def _plain(unit: str) -> str:
+    """A unit in lower case, without raised digits."""
+    return unicodedata.normalize("NFKC", unit).replace("\u2212", "-").lower().strip()
 
 
 def units_of(kind: Kind) -> dict[str, float]:

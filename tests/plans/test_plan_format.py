@@ -36,6 +36,36 @@ def test_increments_are_told_by_name_and_a_rate_is_none():
     assert [names[i] for i in form.increments] == ["dx", "dyaw", "drx", "delta_joint1", "DZ"]
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("left_dx", "ee_dx", "d_x", "delta.x", "delta x", "action.delta_x", "action/delta_x"),
+        *("deltaX", "dX", "x_delta", "joint1_delta", "dpos_x", "dgripper", "gripper_delta"),
+        *("rel_x", "increment_0", "Δx", "∆x", "d_joint1", "world_vector_0", "gripper_dyaw"),
+    ],
+)
+def test_increments_have_many_names(name):
+    assert PlanFormat((name,), ("rad",), 0.02).increments == (0,)
+    assert PlanFormat((name,), ("rad/sec",), 0.02).increments == ()
+
+
+@pytest.mark.parametrize(
+    "name", ["dq1", "vx", "dt", "d1", "d_3", "id", "grid_x", "width", "dist", "q_d_1", "index"]
+)
+def test_rates_slides_and_other_names_are_no_increments(name):
+    assert PlanFormat((name,), ("rad",), 0.02).increments == ()
+
+
+def test_rates_beside_their_joints_as_plans_are_exported_are_no_increments():
+    names = ("joint1", "d_joint1", "dd_joint1", "d_joint2")
+    assert PlanFormat(names, ("rad",) * 4, 0.02).increments == (3,)
+
+
+def test_rates_are_told_by_any_unit_per_time():
+    form = PlanFormat(tuple("abcde"), ("rad", "m/sec", "rpm", "m/s^2", "rad s^-1"), 0.02)
+    assert form.rates == (1, 2, 4)
+
+
 def test_increments_are_summed_from_0_and_taken_apart_again():
     frames = np.array([[1.0, 5.0], [2.0, 6.0], [-0.5, 7.0]])
     poses = summed(frames, [0])

@@ -13,15 +13,23 @@ from jaxtyping import Float
 from prior_reinforce.arrays import Frames, Point, is_positive
 from prior_reinforce.errors import InvalidPlanError
 from prior_reinforce.plans.whole_turns import TURN, other_form
+from prior_reinforce.units import per_time
 
 _INCREMENT = re.compile(
-    r"d(x|y|z|rx|ry|rz|roll|pitch|yaw|theta|phi|psi|heading|angle)|delta_\w+", re.IGNORECASE
+    r"\b(d(r?[xyz]|roll|pitch|yaw|theta|phi|psi|heading|angle|pos|rot|joint|grip(per)?)"
+    r"|delta|incr?|increments?|rel|relative|world vector)\b|^d (?!\d)"
 )
-"""What an increment is called."""
+"""What an increment is called, in `words`; `world_vector` is that of RT-1 (Open X-Embodiment)."""
 OF_A_TOOL = (
     r"grip|jaw|finger|width|claw|opening|suction|robotiq|wsg|greifer|pince|夹爪|夹具|vacuum|valve"
 )
 """Words in the name of a gripper's or another tool's dimension."""
+
+
+def words(name: str) -> str:
+    """Return the words of a name in lower case, with blanks between: `joint 1 delta x`."""
+    apart = re.sub("(?<=[a-z])(?=[A-Z])", " ", re.sub("[Δ∆δ]", " delta ", name))
+    return " ".join(re.findall(r"[^\W\d_]+|\d+", apart.lower()))
 
 
 @dataclass(frozen=True)
@@ -82,12 +90,23 @@ class PlanFormat:
 
     @property
     def increments(self) -> tuple[int, ...]:
-        """Columns that say by how much a pose moves on until the next frame: `dx`, `delta_joint1`.
+        """Columns that say by how much a pose moves on until the next frame: `dx`, `joint1_delta`.
 
-        What counts of them is their sum. A rate, as in m/s, is no increment.
+        What counts of them is their sum. Those of a place and a heading are along the table's axes
+        (`x` and `y` of outcomes); odometry, along a body's own, must be recorded as poses. A rate,
+        as in m/s, is no increment; nor is `d_joint1` beside `joint1`, which are rates in exports.
         """
-        each = enumerate(zip(self.names, self.units, strict=True))
-        return tuple(i for i, (n, unit) in each if _INCREMENT.fullmatch(n) and "/" not in unit)
+        rates = {f"{derivative}_{name}" for name in self.names for derivative in ("d", "dd")}
+        return tuple(
+            i
+            for i, (name, unit) in enumerate(zip(self.names, self.units, strict=True))
+            if _INCREMENT.search(words(name)) and name not in rates and not per_time(unit)
+        )
+
+    @property
+    def rates(self) -> tuple[int, ...]:
+        """Columns whose unit is one per time: m/s, rad/sec, rpm."""
+        return tuple(i for i, unit in enumerate(self.units) if per_time(unit) == 1)
 
     def toward(self, frames: Frames, pose: Point) -> Frames:
         """Return a motion in the turns and signs in which its first frame is nearest to a pose.
