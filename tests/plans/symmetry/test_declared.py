@@ -99,6 +99,9 @@ def test_increments_are_played_turned_and_shifted_as_such():
         (("x", "y", "q0", "q1", "q2", "q3"), "q0, q1, q2, q3"),
         (("dx", "dy", "drx", "dry"), "drx, dry"),
         (("dx", "dy", "dtheta"), "dtheta"),
+        (("x", "y", "gripper_yaw"), "gripper_yaw"),
+        (("x", "y", "finger_x", "jaw_angle", "gripper_vx"), "finger_x, jaw_angle, gripper_vx"),
+        (("x", "y", "gripper_qw", "gripper_width"), "gripper_qw"),
     ],
 )
 def test_what_a_turn_would_leave_behind_is_refused_until_it_is_named(names, left):
@@ -121,9 +124,87 @@ def test_a_shift_knows_every_place():
     assert declare_symmetry(one, 2, distance="shift").moves == (Shift(0, 8), Shift(1, 8))
 
 
-def test_rates_are_played_as_what_they_add_up_to():
+@pytest.mark.parametrize(
+    ("names", "left"),
+    [
+        (("x", "y", "z", "right_x", "right_y", "right_z"), "right_x, right_y, right_z"),
+        (("x", "y", "target_x", "pose_x", "p2x", "x2"), "target_x, pose_x, p2x, x2"),
+        (("dx", "dy", "right_dx", "right_dy"), "right_dx, right_dy"),
+        (("x", "y", "gripper_x", "gripper"), "gripper_x"),
+    ],
+)
+def test_a_shift_knows_places_by_name_where_units_were_guessed(names, left):
+    form = PlanFormat(names, ("m", "m", *("rad",) * (len(names) - 2)), 0.04)
+    with pytest.raises(ConfigurationError, match=f"a shift would leave {left} as recorded"):
+        declare_symmetry(form, 2, distance="shift")
+    declare_symmetry(form, 2, distance="shift", steps=left.split(", "))
+
+
+@pytest.mark.parametrize("names", ["quat_w quat_x quat_y quat_z", "rot_x rot_y", "rx ry rz", "vx"])
+def test_a_shift_leaves_attitudes_and_rates(names):
+    names = names.split()
+    units = ("m/s",) if names == ["vx"] else ("rad",) * len(names)
+    form = PlanFormat(("x", "y", *names), ("m", "m", *units), 0.04)
+    assert declare_symmetry(form, 2, distance="shift").moves == (Shift(0), Shift(1))
+
+
+@pytest.mark.parametrize("about", ["base", (0.43, 0.0)])
+def test_what_moves_beside_an_arm_is_refused_until_it_is_named(about):
+    left = ["base_x", "base_theta", "left_elbow"]
+    openings = ["gripper", "gripper_width", "finger_1", "gripper_position"]
+    names = (*openings, *JOINTS.names[1:], *left)
+    form = PlanFormat(names, ("1",) * 4 + ("rad",) * 10, 0.01)
+    said = {"about": about, "chain": PANDA, "joints": range(4, 11)}
+    with pytest.raises(ConfigurationError, match=f"would leave {', '.join(left)} as recorded"):
+        declare_symmetry(form, 2, **said)
+    assert declare_symmetry(form, 2, steps=left, **said).moves[0].steps == (11, 12, 13)
+
+
+@pytest.mark.parametrize("about", ["base", (0.43, 0.0)])
+@pytest.mark.parametrize(("prefix", "unit"), [("", "rad/s"), ("delta_", "rad")])
+def test_rates_and_increments_of_joints_are_not_turned(about, prefix, unit):
+    names = tuple(prefix + name for name in JOINTS.names[1:])
+    form = PlanFormat(names, (unit,) * 7, 0.01)
+    with pytest.raises(ConfigurationError, match=r"joint1.* are no positions"):
+        declare_symmetry(form, 2, about=about, chain=PANDA, joints=range(7))
+
+
+@pytest.mark.parametrize("said", [{"distance": "shift"}, {"about": "base"}])
+def test_rates_of_a_hand_are_neither_shifted_nor_turned(said):
+    """The way to the moved start is a way a frame."""
+    form = PlanFormat(("dx", "dy"), ("m/s", "m/s"), 0.01)
+    with pytest.raises(ConfigurationError, match="dx, dy are no positions"):
+        declare_symmetry(form, 2, **said)
+
+
+def test_one_number_a_plan_is_turned_or_refused_where_it_is_a_place_or_heading():
+    names = ("x", "y", "aim_x", "aim_y", "heading", "stiffness")
+    form = PlanFormat(names, ("m",) * 4 + ("rad", "1"), 0.01, per_plan=names[2:])
+    with pytest.raises(ConfigurationError, match="would leave aim_x, aim_y, heading as recorded"):
+        declare_symmetry(form, 2, about="base")
+
+
+@pytest.mark.parametrize(
+    ("names", "units", "distance", "wrong"),
+    [
+        (("q", "a"), ("rad", "m/s^2"), "tempo", ["a"]),
+        (("q", "tau", "grip_force"), ("rad", "Nm", "N"), "amplitude", ["tau"]),
+        (("q", "release_time"), ("rad", "s"), "tempo", ["release_time"]),
+        (("q", "qw", "qx", "qy", "qz"), ("rad",) * 5, "amplitude", ["qw", "qx", "qy", "qz"]),
+    ],
+)
+def test_what_cannot_be_scaled_is_refused_until_it_is_named(names, units, distance, wrong):
+    form = PlanFormat(names, units, 0.01)
+    with pytest.raises(ConfigurationError, match=rf"{', '.join(wrong)} would not be right"):
+        declare_symmetry(form, 1, distance=distance)
+    stay = declare_symmetry(form, 1, distance=distance, steps=wrong).moves[0].steps
+    assert [names[i] for i in stay] == wrong
+
+
+@pytest.mark.parametrize("unit", ["rad/s", "rad/sec", "rpm"])
+def test_rates_are_played_as_what_they_add_up_to(unit):
     """Velocities of a motion that is played twice as fast are twice as large."""
-    form = PlanFormat(("joint1", "speed2"), ("rad", "rad/s"), 0.02)
+    form = PlanFormat(("joint1", "speed2"), ("rad", unit), 0.02)
     t = np.arange(60) / 59
     plan = np.column_stack([t**2 * (3 - 2 * t), 6 * t * (1 - t) / (59 * 0.02)])
     symmetry = declare_symmetry(form, 1, exponent=1.0)

@@ -7,7 +7,8 @@
 - *Only a turn is known* (`distance="learned"`): several demonstrations tell all but the bearing.
 
 What a plan is, its names and units say: joints of a known arm, poses (x and y in m, with rx, ry and
-rz, or qw, qx, qy and qz, or yaw), or increments of them (dx, dy, dyaw).
+rz, or qw, qx, qy and qz, or yaw), or increments of them (dx, dy, dyaw) along the table's axes:
+odometry, whose increments are along the robot's own, must be recorded as poses.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from msgspec import UNSET
 
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.kinematics import UPRIGHT, Chain, first_axis, leaning
-from prior_reinforce.plans.plan_format import OF_A_TOOL, PlanFormat
+from prior_reinforce.plans.plan_format import OF_A_TOOL, PlanFormat, words
 from prior_reinforce.plans.symmetry.moves import (
     NOMINAL_EXPONENT,
     Amplitude,
@@ -36,13 +37,20 @@ from prior_reinforce.plans.symmetry.moves import (
     TurnPoses,
 )
 from prior_reinforce.plans.symmetry.symmetry import Symmetry, scale_alone, shift, turn_and_scale
-from prior_reinforce.plans.whole_turns import euler_angles
-from prior_reinforce.units import kind_of
+from prior_reinforce.plans.whole_turns import attitudes, euler_angles
+from prior_reinforce.units import is_force, kind_of, per_time
 
 About = Literal["base"] | tuple[float, float] | None
 Distance = Literal["tempo", "amplitude", "learned", "shift"]
 _VECTOR, _QUATERNION = ("rx", "ry", "rz"), ("qw", "qx", "qy", "qz")
 _TOOL = re.compile(OF_A_TOOL, re.IGNORECASE)
+_COORDINATE = re.compile(r"(?<!\b[qr] )\bd?[xyz]( \d+)?$")
+_OF_ATTITUDE = r"quat|orient|\brot|attitude"
+_POSE = re.compile(
+    rf"\b([dvr]?[xyz]|q[wxyz])\b|{_OF_ATTITUDE}|\bpose\b"
+    r"|\bd?(roll|pitch|yaw|heading|bearing|azimuth|theta|phi|psi|angle)\b"
+)
+"""What a coordinate of a place, and anything of a pose, is called, in `words`."""
 _ON_AXIS = 1e-3
 """How far from the first joint's axis a place may be and be on it, [m]. Ours: half a turn about the
 one or the other then differs by 2 mm."""
@@ -92,8 +100,8 @@ def declare_symmetry(
         raise ConfigurationError(
             f"release_frame says about which frame tempo plays a motion; distance is {distance!r}"
         )
-    rates = [i for i, unit in enumerate(form.units) if unit.endswith("/s")]
-    increments = tuple(sorted({*form.increments, *rates}))
+    _refuse_unplayable(form, distance, steps)
+    increments = tuple(sorted({*form.increments, *form.rates}))
     if distance == "shift":
         place = _columns(column, ("x", "y")) or _columns(column, ("dx", "dy"))
         if len(place) != 2 or k != 2:
@@ -101,10 +109,9 @@ def declare_symmetry(
                 "distance 'shift' needs plans with x and y (or dx and dy) and outcomes x and y; "
                 f"plans have {', '.join(form.names)}, outcomes {k} components"
             )
-        places = [i for i, unit in enumerate(form.units) if kind_of(unit) == "length"]
-        _refuse_left_behind(
-            form, "shift", {*place, *increments, *_columns(column, ("z",))}, steps, places
-        )
+        _refuse_rates(form, place, form.rates)
+        known = (*place, *form.rates, *_named(column, ("z", "dx", "dy", "dz")))
+        _refuse_left_behind(form, "shift", known, steps, _places(form))
         return shift((place[0], place[1]), _LEAD if place[0] in increments else 0)
     stepped = tuple(column[name] for name in steps)
     scale: AnyMove = Amplitude(exponent, stepped, increments)
@@ -138,6 +145,8 @@ def declare_symmetry(
         )
     centre = _centre(about)
     if chain is not None and joints:
+        _refuse_rates(form, joints, increments)
+        _refuse_left_behind(form, "turn", joints, steps)
         if about != "base" and not _on_first_axis(chain, centre):
             path = TurnPath(chain, centre, tuple(joints), tuple(ranges) or UNSET)
             return turn_and_scale(path, centre, scale, others)
@@ -156,13 +165,16 @@ def declare_symmetry(
                 )
         known = (*place, *vector, *quaternion, *_named(column, ("z", "yaw")))
         known += _columns(column, ("roll", "pitch", "yaw"))
+        _refuse_rates(form, known, form.rates)
         _refuse_left_behind(form, "turn", known, steps)
         turn: AnyMove = TurnPoses(
             centre, (place[0], place[1]), vector or None, quaternion or None, column.get("yaw")
         )
         return turn_and_scale(turn, centre, scale, others)
     if place := _columns(column, ("dx", "dy")):
-        _refuse_left_behind(form, "turn", _named(column, ("dx", "dy", "dz", "dyaw")), steps)
+        known = _named(column, ("dx", "dy", "dz", "dyaw"))
+        _refuse_rates(form, known, form.rates)
+        _refuse_left_behind(form, "turn", known, steps)
         turn = TurnIncrements(start, centre, (place[0], place[1]), column.get("dyaw"), _LEAD)
         return turn_and_scale(turn, centre, scale, others)
     raise ConfigurationError(
@@ -209,21 +221,68 @@ def _refuse_left_behind(
     steps: Sequence[str],
     among: Iterable[int] | None = None,
 ) -> None:
-    """Refuse columns that a move would leave as they are, unless they are a tool's or are named.
+    """Refuse columns that a move would leave as they are, unless they are openings or are named.
 
     A second place, a heading of another name or a velocity turns with the motion.
     """
-    alone = {*steps, *form.per_plan}
+    every = range(form.action_dim) if among is None else among
     left = [
-        form.names[i]
-        for i in (range(form.action_dim) if among is None else among)
-        if i not in known and form.names[i] not in alone and not _TOOL.search(form.names[i])
+        name
+        for name in (form.names[i] for i in every if i not in known)
+        if name not in steps and not _stays(form, name)
     ]
     if left:
         raise ConfigurationError(
-            f"a {move} would leave {', '.join(left)} as recorded: it moves x, y, z, yaw, rx, ry, "
-            "rz in radians, qw, qx, qy, qz, and increments dx, dy, dz, dyaw; rename columns that "
-            f"are these, and of what is right so say steps = {left}"
+            f"a {move} would leave {', '.join(left)} as recorded: it moves the arm's joints, or x, "
+            "y, z, yaw, rx, ry, rz in radians, qw, qx, qy, qz, and increments dx, dy, dz, dyaw; "
+            f"rename columns that are these, and of what is right so say steps = {left}"
+        )
+
+
+def _stays(form: PlanFormat, name: str) -> bool:
+    """Whether a column is a tool's opening, or one number a plan, and so is right in any place."""
+    tool = name in form.per_plan or _TOOL.search(name) is not None
+    return tool and _POSE.search(words(name)) is None
+
+
+def _places(form: PlanFormat) -> list[int]:
+    """Columns of a length, or whose name says a coordinate, as units may have been guessed."""
+    turned = {name for group in (*form.attitudes, *attitudes(form.names)) for name in group}
+    turned |= {name for group in euler_angles(form.names, form.units) for name in group}
+    turned |= {name for name in form.names if re.search(_OF_ATTITUDE, words(name))}
+    return [
+        i
+        for i, (name, unit) in enumerate(zip(form.names, form.units, strict=True))
+        if kind_of(unit) == "length" or (name not in turned and _COORDINATE.search(words(name)))
+    ]
+
+
+def _refuse_rates(form: PlanFormat, moved: Iterable[int], rates: Collection[int]) -> None:
+    """Refuse rates among the columns to which a move would add an angle or a way."""
+    if wrong := [form.names[i] for i in moved if i in rates]:
+        raise ConfigurationError(
+            f"{', '.join(wrong)} are no positions, to which an angle or a way could be added; "
+            "record positions of joints, poses x and y in m, or increments dx and dy in m, or take "
+            "[symmetry] out"
+        )
+
+
+def _refuse_unplayable(form: PlanFormat, distance: Distance, steps: Sequence[str]) -> None:
+    """Refuse columns that are not right in a motion that is played faster or made larger."""
+    if distance not in ("tempo", "amplitude"):
+        return
+    each = [*zip(form.names, form.units, strict=True)]
+    wrong = [n for n, u in each if (per_time(u) > 1 or is_force(u)) and not _stays(form, n)]
+    if distance == "tempo":
+        wrong += [name for name, unit in each if kind_of(unit) == "time"]
+    else:
+        groups = {*form.attitudes, *attitudes(form.names)}
+        quaternions = {name for group in groups if len(group) == 4 for name in group}
+        wrong += [name for name in form.names if name in quaternions]
+    if wrong := [name for name in wrong if name not in steps]:
+        raise ConfigurationError(
+            f"{distance} scales positions and rates, and {', '.join(wrong)} would not be right; "
+            f"say another distance, or where they are right as recorded, steps = {wrong}"
         )
 
 

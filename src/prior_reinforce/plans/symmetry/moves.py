@@ -2,7 +2,8 @@
 
 Each member moves the outcome along one component of a chart. It is data (a kind and parameters), is
 called with a plan and an amount in the chart's units, and returns a new plan; at an amount of 0 it
-returns the plan bit for bit. Plans that start and end at rest still do.
+returns the plan bit for bit. Plans that start and end at rest still do, but for increments that are
+turned or shifted: their first frames lead the hand to its moved start at a constant speed.
 
     plan    (H, D)  in the units of its format; a frame is one row
     amount  w_j     in the chart's units, [rad] for turns, [m] for shifts, [1] for ln distance
