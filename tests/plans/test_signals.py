@@ -144,6 +144,13 @@ def test_a_joint_that_moves_by_its_noise_only_is_held(sigma):
     assert held([ramp]) == [False]
 
 
+def test_increments_are_held_where_their_sum_is():
+    lift = np.diff(0.01 * swing(0, 90), prepend=0.0)[None, :, None]
+    assert np.abs(lift).max() < 3e-4
+    assert analyse(lift, ("m",), 0.01, (0,)).kinds == ("smooth",)
+    assert analyse(0 * lift, ("m",), 0.01, (0,)).kinds == ("held",)
+
+
 def test_a_held_channel_is_its_mean_and_all_else_stays():
     given = plans()
     still = without_noise(given, np.array([False, True, False, False]))

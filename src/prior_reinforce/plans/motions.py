@@ -231,7 +231,8 @@ class Demonstrations:
     @cached_property
     def signals(self) -> Signals:
         """Noise, kind and rest of each dimension, analysed once."""
-        return analyse(self.plans, self.format.units, self.format.dt)
+        form = self.format
+        return analyse(self.plans, form.units, form.dt, form.increments)
 
     @cached_property
     def spread(self) -> Point:

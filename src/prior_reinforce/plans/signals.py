@@ -32,6 +32,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float
 
+from prior_reinforce.plans.plan_format import summed
 from prior_reinforce.plans.speeds import (
     SMOOTHING,
     Channels,
@@ -47,7 +48,7 @@ ChannelKind = Literal["held", "switch", "step", "smooth"]
 HELD = 1e-4
 """A channel is held if it leaves its mean by at most this, rms, in rad or m (in other units: this
 part of the largest range of that unit). Ours: what a plan may be off by and still count as
-reproduced. It is so small because a plan may consist of increments."""
+reproduced. Of increments their sum counts."""
 COUNTS: Mapping[Kind, float] = {"angle": 1e-3, "length": 5e-4}
 """Range of a few counts of an encoder, and distance from a pose that is none, in [rad] and [m].
 Ours: below what moves a throw by a millimetre."""
@@ -124,10 +125,16 @@ class Signals:
         return np.array([kind in ("step", "switch") for kind in self.kinds])
 
 
-def analyse(motions: Sequence[Motion] | np.ndarray, units: Sequence[str], dt: float) -> Signals:
+def analyse(
+    motions: Sequence[Motion] | np.ndarray,
+    units: Sequence[str],
+    dt: float,
+    increments: Sequence[int] = (),
+) -> Signals:
     """Analyse motions of the same channels, all together: plans, or recordings of any length.
 
-    `dt` is the time between two frames, in [s]; of recordings, their median period.
+    `dt` is the time between two frames, in [s]; of recordings, their median period. `increments`
+    are columns of which the sum counts (`PlanFormat.increments`).
     """
     sigma = noise(motions)
     ranges = np.ptp(np.concatenate(list(motions)), axis=0)
@@ -136,8 +143,9 @@ def analyse(motions: Sequence[Motion] | np.ndarray, units: Sequence[str], dt: fl
     steps = [np.abs(np.diff(motion, axis=0)) for motion in motions]
     slow = END_STEP * np.max([step.max(axis=0) for step in steps], axis=0)
     profiles = velocity_profiles(motions, units, SMOOTHING / dt)
+    held = held_channels([summed(motion, increments) for motion in motions], units)
     return Signals(
-        kinds=_kinds(motions, steps, held_channels(motions, units), sigma),
+        kinds=_kinds(motions, steps, held, sigma),
         noise=sigma,
         trim_band=np.maximum(_TRIM_SHARE * largest_of_unit(largest, units), counts),
         pose_band=np.maximum(_POSE_SHARE * largest_of_unit(ranges, units), _NOISE_PEAK * sigma),

@@ -225,7 +225,7 @@ def _choose(demonstrations: Demonstrations, d: int, length: int, splines: bool) 
         largest = max(
             _LARGEST_SPLINE_RESIDUAL * extent,
             min(NOISE_RMS * float(signals.noise[d]), _MOST_NOISE * extent),
-            HELD if form.units[d] in ("rad", "m") else 0.0,
+            HELD if form.units[d] in ("rad", "m") and d not in form.increments else 0.0,
         )
         for fold in _SPLINE_FOLDS:
             if _DEGREE < fold * length < horizon:
