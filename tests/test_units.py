@@ -13,6 +13,7 @@ from prior_reinforce.units import (
     kind_of,
     looks_like,
     per_time,
+    rates,
     spelt,
     spoken,
     units_of,
@@ -68,6 +69,11 @@ def test_rates_and_accelerations_are_told_by_their_units(powers, units):
 def test_forces_and_torques_are_told_by_their_units():
     assert all(map(is_force, ("N", "Nm", "N m", "N·m", "mNm", "kN", "N cm")))
     assert not any(map(is_force, ("m", "min", "in", "1", "rad")))
+
+
+def test_a_rate_is_per_time():
+    units = ["m/s", "rad/sec", "deg/min", "rpm", "counts/turn", "m", "1", "percent"]
+    assert rates(units) == [0, 1, 2, 3]
 
 
 def test_people_say_centimetres_milliseconds_and_degrees():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -147,6 +147,16 @@ def is_force(unit: str) -> bool:
 def _plain(unit: str) -> str:
     """A unit in lower case, without raised digits."""
     return unicodedata.normalize("NFKC", unit).replace("\u2212", "-").lower().strip()
+
+
+def is_rate(unit: str) -> bool:
+    """Return whether numbers in a unit are speeds, 0 at rest: m/s, rad/sec, deg/min, rpm."""
+    return per_time(unit) == 1
+
+
+def rates(units: Sequence[str]) -> list[int]:
+    """Return the columns that are speeds."""
+    return [i for i, unit in enumerate(units) if is_rate(unit)]
 
 
 def units_of(kind: Kind) -> dict[str, float]:

@@ -41,7 +41,7 @@ from prior_reinforce.plans.speeds import (
     motion_span,
     velocity_profiles,
 )
-from prior_reinforce.units import Kind, in_unit
+from prior_reinforce.units import Kind, in_unit, is_rate
 
 ChannelKind = Literal["held", "switch", "step", "smooth"]
 
@@ -253,14 +253,19 @@ def _kinds(
     return tuple(kinds)
 
 
-def moving_rows(motion: Motion, band: Channels) -> tuple[int, int] | None:
+def moving_rows(
+    motion: Motion, band: Channels, rates: Sequence[int] = ()
+) -> tuple[int, int] | None:
     """Return the first row away from the first pose, and the last one away from the last pose.
 
     A motion that returns to where it began has rows of both kinds all the same. None if nothing
-    moves. `band` is how far each channel may stray from a pose: `trim_band` or `pose_band`.
+    moves. `band` is how far each channel may stray from a pose: `trim_band` or `pose_band`; from 0
+    where its column is one of `rates`, which are 0 at rest.
     """
-    left = np.flatnonzero(np.any(np.abs(motion - motion[0]) > band, axis=1))
-    ahead = np.flatnonzero(np.any(np.abs(motion - motion[-1]) > band, axis=1))
+    first, last = np.array(motion[0]), np.array(motion[-1])
+    first[list(rates)] = last[list(rates)] = 0.0
+    left = np.flatnonzero(np.any(np.abs(motion - first) > band, axis=1))
+    ahead = np.flatnonzero(np.any(np.abs(motion - last) > band, axis=1))
     if not left.size:
         return None
     return int(left[0]), int(ahead[-1] if ahead.size else left[-1])
@@ -271,15 +276,19 @@ def moving_ends(
 ) -> Bool[np.ndarray, "2 D"]:
     """Return which channels move at the first frames of a recording, and which at the last.
 
-    The speed is the slope of a line through the frames of 40 ms, at least two.
+    The speed is the slope of a line through the frames of 40 ms, at least two; of channels whose
+    unit is a rate's, their mean.
     """
+    rates = np.array([is_rate(unit) for unit in units])
     count = max(2, int(np.searchsorted(times, times[0] + _END_TIME, side="right")))
-    fastest = np.abs(np.gradient(motion, times, axis=0)).max(axis=0)
+    fastest = np.abs(np.where(rates, motion, np.gradient(motion, times, axis=0))).max(axis=0)
     rest = [in_unit(REST_SPEED, u) or _REST_SHARE * f for u, f in zip(units, fastest, strict=True)]
     moving = []
     for at in (slice(count), slice(-count, None)):
         t = times[at] - times[at].mean()
         total = float(t @ t)
-        slope = np.abs(t @ (motion[at] - motion[at].mean(axis=0))) / total
-        moving.append(slope > np.maximum(rest, _NOISE_PEAK * signals.noise / math.sqrt(total)))
-    return np.array(moving) & ~signals.held
+        mean = motion[at].mean(axis=0)
+        speed = np.abs(np.where(rates, mean, t @ (motion[at] - mean) / total))
+        off = np.where(rates, 1 / math.sqrt(len(t)), 1 / math.sqrt(total)) * signals.noise
+        moving.append(speed > np.maximum(rest, _NOISE_PEAK * off))
+    return np.array(moving) & (~signals.held | rates)

@@ -159,6 +159,22 @@ def test_increments_at_their_own_rate_stay_and_are_0_once_the_motion_is_over():
     np.testing.assert_allclose(done.plans[0, 20:], [[0.0, steps[19, 1]]] * 10, atol=1e-12)
 
 
+def test_a_drive_at_constant_speed_is_motion_and_a_speed_is_0_once_the_recording_is_over():
+    t = np.arange(90) / 30
+    drive = np.interp(t, [0.5, 0.8], [0.0, 0.2])
+    turn = np.interp(t, [1.0, 1.1, 1.3, 1.4], [0.0, 0.3, 0.3, 0.0])
+    speeds = np.column_stack([drive, turn])
+    short, long = recording(t[:80], speeds[:80], "0"), recording(t, speeds, "1")
+    done = preprocess([short, long], ("m/s", "rad/s"), Preprocessing())
+    assert 0.3 < done.starts[0] < 0.5
+    np.testing.assert_allclose(
+        done.plans[:, :, 0].sum(axis=1) / 30, [drive[:80].sum() / 30, drive.sum() / 30], atol=1e-9
+    )
+    assert not done.plans[0, -10:].any()
+    assert [remark.partition(":")[0] for remark in done.remarks] == ["0", "1"]
+    assert all("0.2 m/s" in remark and "pose" not in remark for remark in done.remarks)
+
+
 def test_a_gripper_step_does_not_ring():
     t = np.arange(41) / 20
     q = np.column_stack([np.sin(t), (t >= 1.0) * 0.08])

@@ -33,7 +33,7 @@ from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.plans.plan_format import PlanFormat, summed
 from prior_reinforce.plans.speeds import Channels
 from prior_reinforce.plans.symmetry import Symmetry
-from prior_reinforce.units import UNITS, factor
+from prior_reinforce.units import UNITS, factor, rates
 
 _SMOOTH_HZ = 20
 _SMOOTH = f"--smooth {_SMOOTH_HZ}"
@@ -110,9 +110,10 @@ class Inspection:
     def remarks(self) -> tuple[str, ...]:
         """Warnings, the most important first: limits, ends, gaps, ..."""
         left_out = self.selection.left_out
+        moved = (*self.format.increments, *rates(self.format.units))
         first = (
             self.copies,
-            all_return(self._poses),
+            all_return(summed(self.processed.plans, moved)),
             *self.selection.remarks,
             *self._broken(),
             self._noise_warning(),

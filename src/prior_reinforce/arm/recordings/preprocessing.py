@@ -28,6 +28,7 @@ from prior_reinforce.plans.plan_format import stepped, summed
 from prior_reinforce.plans.signals import Signals, analyse, moving_ends, moving_rows
 from prior_reinforce.plans.speeds import Channels, largest_of_unit
 from prior_reinforce.settings import Checked, NonNegative, Positive
+from prior_reinforce.units import rates
 
 _ON_GRID = 0.02
 """A frame within this share of a time step of where it should be is taken as recorded. Ours: at
@@ -110,8 +111,8 @@ def preprocess(
     """Trim and resample N recordings of the same D channels, in `units`, and to one horizon.
 
     Increments are summed up before, and taken between frames after: half as many frames a second
-    have increments twice as large. InvalidDemonstrationsError if an episode never moves, exceeds
-    the horizon, or leaps.
+    have increments twice as large. Channels in a rate's unit, such as m/s, rest at 0.
+    InvalidDemonstrationsError if an episode never moves, exceeds the horizon, or leaps.
     """
     durations = [recording.duration for recording in recordings]
     if increments:
@@ -161,6 +162,8 @@ def preprocess(
         remarks[_Kind.LONG, what] = []
     rows = horizon + more
     plans = np.stack([np.pad(p, ((0, rows - len(p)), (0, 0)), mode="edge") for p in pieces])
+    for plan, piece in zip(plans, pieces, strict=True):
+        plan[len(piece) :, rates(units)] = 0.0
     return Preprocessed(
         stepped(plans, increments) if increments else plans,
         dt,
@@ -271,11 +274,17 @@ def _remarks(
     if np.count_nonzero(kept) < _FEWEST_FRAMES:
         return
     starts, ends = moving_ends(t[kept], recording.positions[kept], units, signals)
+    speeds = rates(units)
     then = ", then holds its last pose" if held else ""
     for moving, what in ((starts, "starts in motion"), (ends, f"ends in motion{then}")):
-        if np.any(moving):
-            names = [recording.names[i] for i in np.flatnonzero(moving)]
+        if names := [recording.names[i] for i in np.flatnonzero(moving) if i not in speeds]:
             yield _Kind.ENDS, f"{what} ({say_names(names)})"
+    then = "; its plan is 0 from there on, at once" if held else ""
+    for moving, row, what in ((starts, 0, "starts at a speed of"), (ends, -1, "ends at")):
+        for i in np.flatnonzero(moving):
+            if i in speeds:
+                speed = f"{recording.positions[kept][row, i]:.3g} {units[i]}"
+                yield _Kind.ENDS, f"{what} {speed}{then if row else ''} ({recording.names[i]})"
 
 
 def _smoothed(
@@ -346,20 +355,23 @@ def _moving_span(
     recording: Recording, units: tuple[str, ...], signals: Signals, margin: float
 ) -> tuple[float, float]:
     """From when to when a recording is kept, in [s]: its motion and a margin."""
-    t, rows = recording.times, moving_rows(recording.positions, signals.trim_band)
+    t, speeds = recording.times, rates(units)
+    rows = moving_rows(recording.positions, signals.trim_band, speeds)
     if rows is None:
         raise InvalidDemonstrationsError(
             f"episode {recording.episode} never moves by more than {signals.trim_band.max():.2g} "
             "from its first pose; leave it out, or import without trimming (--no-trim)"
         )
     # The last frame within the still band before the motion, and the first one after it.
-    before, after = rows[0] - 1, min(rows[1] + 1, len(t) - 1)
+    before, after = max(rows[0] - 1, 0), min(rows[1] + 1, len(t) - 1)
     first = max(int(np.searchsorted(t, t[before] - margin, side="right")) - 1, 0)
     last = min(int(np.searchsorted(t, t[after] + margin)), len(t) - 1)
     # A long soft start or end is within the band for longer than the margin, and yet no rest.
     steps = np.abs(np.diff(recording.positions, axis=0))
+    steps[:, speeds] = np.abs(recording.positions[:-1, speeds])
     slow = _BEGINS * largest_of_unit(steps.max(axis=0), units)
-    at_rest = (steps <= np.maximum(slow, _NOISE_OVERSHOOT * signals.noise)) | signals.held
+    at_rest = steps <= np.maximum(slow, _NOISE_OVERSHOOT * signals.noise)
+    at_rest |= signals.held & ~np.isin(np.arange(len(units)), speeds)
     rests = np.flatnonzero(np.all(at_rest, axis=1))
     first = min(first, int(np.max(rests[rests < before], initial=-1)) + 1)
     last = max(last, int(np.min(rests[rests >= after], initial=len(t) - 1)))
