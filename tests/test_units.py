@@ -74,6 +74,9 @@ def test_forces_and_torques_are_told_by_their_units():
 def test_a_rate_is_per_time():
     units = ["m/s", "rad/sec", "deg/min", "rpm", "counts/turn", "m", "1", "percent"]
     assert rates(units) == [0, 1, 2, 3]
+    assert factor("deg/s", "rad/sec") == pytest.approx(math.pi / 180)
+    assert factor("mm/s", "m/min") == pytest.approx(0.06)
+    assert factor("deg", "rad/s") is None
 
 
 def test_people_say_centimetres_milliseconds_and_degrees():

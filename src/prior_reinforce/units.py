@@ -166,6 +166,12 @@ def units_of(kind: Kind) -> dict[str, float]:
 
 def base_of(unit: str) -> tuple[str, float]:
     """Return the base unit and the factor to it, rad and pi/180 for deg; other units stay."""
+    of, slash, per = unit.rpartition("/")
+    if slash and is_rate(unit):
+        (base, number), (second, time) = (
+            base_of(spelt(each.strip()) or each) for each in (of, per)
+        )
+        return f"{base}/{second}", number / time
     name, number = without_number(unit)
     known = UNITS.get(name)
     if known is None or known.kind == "share":

@@ -21,11 +21,21 @@ from prior_reinforce.arm.recordings.channels import Kind, kinds, one_for_all
         (Kind.PLACE, "gripper_tip_x gripper_tip_y gripper_tip_z"),
         (Kind.ROTATION, "rx ry rz"),
         (Kind.QUATERNION, "qx qy qz qw"),
+        (Kind.LENGTH, "dx dy delta_x left_dz torso_lift_joint"),
+        (Kind.VELOCITY, "vx x.vel"),
+        (Kind.TURN_RATE, "wz dq0 joint1_vel theta.vel qd_3 joint_velocity_0"),
+        (Kind.ANGLE, "dyaw drx"),
+        (Kind.TOOL, "gripper_vel"),
+        (Kind.PLACE, "robot0_eef_pos_0 robot0_eef_pos_1 robot0_eef_pos_2"),
+        (Kind.PLACE, "observation.state.x observation.state.y"),
+        (Kind.QUATERNION, "robot0_eef_quat_0 quat_3"),
+        (Kind.ROTATION, "robot0_eef_rot_axis_angle_0"),
+        (Kind.MATRIX, "rot6d_0 rot6d_1"),
         (Kind.MATRIX, "R11 R12 R13 R21 R22 R23 R31 R32 R33"),
     ],
 )
 def test_a_name_says_what_a_channel_is(kind, names):
-    alone = kind in (Kind.ANGLE, Kind.TOOL, Kind.SLIDE, Kind.UNKNOWN)
+    alone = kind not in (Kind.PLACE, Kind.ROTATION, Kind.QUATERNION, Kind.MATRIX)
     for group in ([name] for name in names.split()) if alone else [names.split()]:
         assert {*kinds(group)} == {kind}, group
 
@@ -67,6 +77,12 @@ def test_the_usual_unit_is_that_of_the_kind():
         "rad", "m", "1",
     ]  # fmt: skip
     assert [Kind.TOOL.usual_unit(most) for most in (0.8, 80.0)] == ["1", "rad"]
+
+
+def test_speeds_and_ways_have_units_of_their_own():
+    each = (Kind.LENGTH, Kind.VELOCITY, Kind.TURN_RATE)
+    assert [kind.usual_unit(300.0) for kind in each] == ["m", "m/s", "rad/s"]
+    assert one_for_all("deg", ["dx", "dq0", "dyaw"]) == [None, None, "deg"]
 
 
 def test_one_unit_is_of_all_that_can_be_in_it():

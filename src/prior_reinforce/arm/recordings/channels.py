@@ -24,8 +24,11 @@ class Kind(Enum):
     SLIDE = "an axis that turns or slides: a rail, E1, a SCARA's d3"
     ROTATION = "a part of a rotation vector, or of angles called like one: rx, ry, rz"
     QUATERNION = "a part of a quaternion: qx, qy, qz, qw"
-    MATRIX = "an entry of a matrix: R11 to R33"
+    MATRIX = "an entry of a matrix: R11 to R33, rot6d_0"
     PLACE = "a coordinate: x, y, z, tool_x; px, py, pz beside an attitude"
+    LENGTH = "a way, or how far something is out: dx, delta_z, torso_lift_joint"
+    VELOCITY = "how fast something goes: vx, x.vel"
+    TURN_RATE = "how fast something turns: dq0, joint1_vel, wz"
     TOOL = "a gripper, or a sensor: a width, a share, a pressure"
     UNKNOWN = "a name that says nothing"
 
@@ -36,14 +39,21 @@ class Kind(Enum):
 
     def usual_unit(self, largest: float) -> str:
         """Return the unit of its numbers where nobody states one, by the largest of them."""
-        if self is Kind.PLACE:
-            return "m"
+        if self in _USUAL:
+            return _USUAL[self]
         share = self is Kind.TOOL and largest <= 1
         return "1" if share or self in (Kind.QUATERNION, Kind.MATRIX) else "rad"
 
 
+_USUAL = {
+    Kind.PLACE: "m",
+    Kind.LENGTH: "m",
+    Kind.VELOCITY: "m/s",
+    Kind.TURN_RATE: "rad/s",
+}
+"""Units of kinds that have the same whatever their numbers."""
 _TURN = rf"{CIRCLES}|pitch|rotation|angle|winkel"
-_ALWAYS = rf"{_TURN}|mcp|pip|dip|cmc|flex(ion)?|abd(uction)?"
+_ALWAYS = rf"{_TURN}|d(r[xyz]|roll|pitch|yaw|heading)|mcp|pip|dip|cmc|flex(ion)?|abd(uction)?"
 _ALONE = "j|q|a"
 _WITHIN = (
     rf"{_TURN}|joint|axis|achse|gelenk|rot|turn|twist|swing|steer|theta|phi|psi|alpha|beta|gamma"
@@ -62,6 +72,16 @@ def _word(words: str) -> str:
     return rf"(^|[^a-z])({words})s?($|[^a-z])"
 
 
+_RATE = r"([._ ]?(vel(ocit(y|ies))?|speeds?)[_.\[ ]*\d*\]?)"
+_BY_NAME = (
+    (re.compile(r"(^|.*[^a-z])(d|delta[_. ]?)[xyz]|.*torso_?lift.*", re.IGNORECASE), Kind.LENGTH),
+    (re.compile(rf"(^|.*[^a-z])(v[xyz]|[xyz]{_RATE})", re.IGNORECASE), Kind.VELOCITY),
+    (re.compile(rf"(^|.*[^a-z])(w[xyz]|(dq|qd)[_.\[ ]*\d+\]?)|.*{_RATE}", re.I), Kind.TURN_RATE),
+    (re.compile(r".*quat(ernion)?[_.\[ ]*\d\]?", re.IGNORECASE), Kind.QUATERNION),
+    (re.compile(r".*(rot_?vec|axis_?angle)[_.\[ ]*\d\]?", re.IGNORECASE), Kind.ROTATION),
+    (re.compile(r".*rot(ation)?_?6d.*", re.IGNORECASE), Kind.MATRIX),
+)
+"""Kinds by what the whole name is, unless it is a gripper's; the first counts."""
 _BY_WORD = (
     (re.compile(_word(_ALWAYS), re.IGNORECASE), Kind.ANGLE),
     (re.compile(_TOOL, re.IGNORECASE), Kind.TOOL),
@@ -72,17 +92,22 @@ _BY_WORD = (
 _COORDINATE = re.compile(r"(?P<group>|.*[^a-z0-9])(?P<part>[xyz])([ _-]?ax[ei]s)?", re.IGNORECASE)
 _OF_PLACE = re.compile(
     r"|(.*[^a-z])?(p|pos|positions?|place|trans(lation)?|cart(esian)?|tcp|tool|tip|ee|eef|pose|xyz"
-    r"|(end_?)?effector|flange|hand|location|ax[ei]s|base)[^a-z]*",
+    r"|(end_?)?effector|flange|hand|location|ax[ei]s|base|state|action)[^a-z]*",
     re.IGNORECASE,
 )
 """What x, y and z are the place of: `tool_x`. Others may be joints: `hip_x`, `hip_y`."""
 _ENTRY = re.compile(r"(?P<group>.*?)[_\[ ]*(?P<part>[0-4][,_]?[0-4])\]?")
-_POSE = re.compile(r"(?P<group>(.*[^a-z])?pose)[_.\[ ]*(?P<part>\d)\]?", re.IGNORECASE)
+_POSE = re.compile(
+    r"(?P<group>(.*[^a-z])?(pose|(?P<place>(ee|eef|tcp|tool|(end_?)?effector|cartesian)"
+    r"[_ ]?(pos(ition)?|xyz))))[_.\[ ]*(?P<part>\d)\]?",
+    re.IGNORECASE,
+)
 _PARTS_OF_POSE = {
     size: (Kind.PLACE,) * 3 + (attitude,) * (size - 3)
-    for size, attitude in ((6, Kind.ROTATION), (7, Kind.QUATERNION))
+    for size, attitude in ((3, Kind.PLACE), (6, Kind.ROTATION), (7, Kind.QUATERNION))
 }
-"""A whole pose that is numbered, by its size: `actual_TCP_pose_0` to `actual_TCP_pose_5`."""
+"""A whole pose that is numbered, by its size: `actual_TCP_pose_0` to `actual_TCP_pose_5`. Three are
+a place only where they are called so: `eef_pos_0` to `eef_pos_2`."""
 _OPENING = re.compile(
     r"(.*[^a-z])?(gripper|jaw|claw|finger)s?([ _./-]*(width|pos(ition)?|q(pos)?|opening|state|value"
     r"|joint\d*))*",
@@ -109,10 +134,14 @@ def kinds(names: Sequence[str]) -> tuple[Kind, ...]:
     poses: dict[str, list[str]] = {}
     for name in names:
         match = _POSE.fullmatch(name.strip())
-        if match and _by_word(match["group"]) is not Kind.ANGLE:  # no `joint_pose_0`
+        if match and (
+            match["place"] or _by_word(match["group"]) is not Kind.ANGLE
+        ):  # `joint_pose_0`
             poses.setdefault(match["group"], []).append(name)
     for pose in poses.values():
-        of_group |= zip(sorted(pose), _PARTS_OF_POSE.get(len(pose), ()), strict=False)
+        match = _POSE.fullmatch(pose[0].strip())
+        if len(pose) > 3 or (match and match["place"]):
+            of_group |= zip(sorted(pose), _PARTS_OF_POSE.get(len(pose), ()), strict=False)
     for group in attitudes(names):
         of_group |= dict.fromkeys(group, Kind.QUATERNION if len(group) == 4 else Kind.ROTATION)
     found = [of_group.get(name) or _by_word(name) for name in names]
@@ -130,12 +159,18 @@ def one_for_all(
     """
     base = base_of(unit)[0]
     fits = [base_of(own)[0] == base for own in plan_units or (base,) * len(names)]
-    other = (Kind.TOOL, Kind.PLACE, Kind.QUATERNION, Kind.MATRIX) if base in TURN else ()
+    angles = (Kind.ANGLE, Kind.SLIDE, Kind.ROTATION, Kind.UNKNOWN)
     each = zip(kinds(names), fits, strict=True)
-    return [unit if kind not in other and (fit or not any(fits)) else None for kind, fit in each]
+    return [
+        unit if (kind in angles or base not in TURN) and (fit or not any(fits)) else None
+        for kind, fit in each
+    ]
 
 
 def _by_word(name: str) -> Kind:
+    for pattern, kind in _BY_NAME:
+        if pattern.fullmatch(name.strip()) and not re.search(_TOOL, name, re.IGNORECASE):
+            return kind
     spaced = re.sub("(?<=[a-z0-9])(?=[A-Z])", "_", name)  # `baseYaw` as `base_Yaw`
     return next((kind for pattern, kind in _BY_WORD if pattern.search(spaced)), Kind.UNKNOWN)
 

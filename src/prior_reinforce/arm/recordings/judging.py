@@ -20,6 +20,7 @@ from prior_reinforce.arm.recordings.naming import vectors
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.units import Ambiguity, is_possible, judge_unit, say_names
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.plans.plan_format import PlanFormat, summed
 from prior_reinforce.plans.whole_turns import TURN
 from prior_reinforce.units import base_of
 
@@ -92,7 +93,10 @@ def beliefs_of(
     plan_units: Sequence[str] | None,
 ) -> list[Belief]:
     """Return what is believed of each channel, whose plan is in its base unit if nobody says."""
-    reach = np.array([np.abs(r.positions).max(axis=0) for r in recordings])
+    usual = [base_of(u or k.usual_unit(0.0))[0] for u, k in zip(stated, kinds(names), strict=True)]
+    form = PlanFormat(names, plan_units or usual, 1.0)
+    poses = [summed(r.positions, form.increments) for r in recordings]  # what increments lead to
+    reach = np.array([np.abs(pose).max(axis=0) for pose in poses])
     takes = [r.episode for r in recordings]
     beliefs = []
     for i, (name, kind, said) in enumerate(zip(names, kinds(names), stated, strict=True)):
@@ -124,7 +128,8 @@ class Judge:
     @cached_property
     def places(self) -> list[Belief]:
         """Coordinates, which are all in one unit."""
-        return [one for one in self.beliefs if one.unit == "m" and one.kind is Kind.PLACE]
+        lengths = (Kind.PLACE, Kind.LENGTH)
+        return [one for one in self.beliefs if one.unit == "m" and one.kind in lengths]
 
     @cached_property
     def far(self) -> list[Belief]:

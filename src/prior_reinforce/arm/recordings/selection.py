@@ -24,6 +24,7 @@ from prior_reinforce.arm.recordings.takes import in_one_unit, odd_takes
 from prior_reinforce.arm.recordings.units import Ambiguity, conversion, say_names, split_unit
 from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
+from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.whole_turns import TURN
 from prior_reinforce.wording import listed
 
@@ -168,10 +169,13 @@ def _refuse_places(
     joints: Sequence[str], names: Sequence[str], plan_units: Sequence[str] | None
 ) -> None:
     """ConfigurationError if places or velocities are to be a plan's joints: `--joints x y z`."""
-    each = zip(joints, names, kinds(joints), plan_units or [""] * len(names), strict=True)
+    wanted, units = kinds(names), plan_units or [""] * len(names)
+    increments = PlanFormat(tuple(names), tuple(units), 1.0).increments
+    no_joint = {n for i, n in enumerate(names) if wanted[i].is_pose or i in increments}
+    each = zip(joints, names, kinds(joints), units, strict=True)
     turning = [(j, n, kind) for j, n, kind, unit in each if unit in TURN]
     places = [(j, n) for j, n, kind in turning if kind is Kind.PLACE]
-    rates = [(j, n) for j, n, _ in turning if j != n and says_no_position(j)]
+    rates = [(j, n) for j, n, _ in turning if j != n and says_no_position(j) and n not in no_joint]
     for wrong, are in ((places, "are a place"), (rates, "look like velocities, torques or else")):
         if wrong:
             recorded, called = zip(*wrong, strict=True)
@@ -248,8 +252,12 @@ def _columns(
                 "no joints: name what holds the joints with --key, or import the place into a "
                 "workspace of --robot none"
             )
-        rates = [name for name in recording.names if says_no_position(name)]
-        if rates and len(recording.names) - len(rates) < len(joints):
+        tool = [name for name, kind in zip(recording.names, of_kind, strict=True) if kind.is_pose]
+        rates = [n for n in recording.names if says_no_position(n) and n not in tool]
+        if len(tool) == len(joints):
+            there += f": {say_names(tool)} look like the pose of a tool"
+            by_key = f" {shlex.join(tool)}{by_key}"
+        elif rates and len(recording.names) - len(rates) < len(joints):
             there += f": {say_names(rates)} look like velocities, torques or else, and positions "
             there += "are missing; record them, or if another column holds them"
         beside = list(recording.beside)

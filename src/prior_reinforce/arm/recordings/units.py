@@ -10,7 +10,16 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from prior_reinforce.errors import ConfigurationError, UnclearUnitsError
-from prior_reinforce.units import STATED, UNITS, factor, spelt, spoken, units_of, without_number
+from prior_reinforce.units import (
+    STATED,
+    UNITS,
+    factor,
+    is_rate,
+    spelt,
+    spoken,
+    units_of,
+    without_number,
+)
 from prior_reinforce.wording import listed
 
 SECONDS = units_of("time")
@@ -24,14 +33,17 @@ libfranka's and RTDE's logs have 1000 and 500."""
 _PLAUSIBLE: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "rad": {unit: (0.0, UNITS[unit].largest) for unit in ("rad", "deg")},
     "m": {unit: (0.0, UNITS[unit].largest) for unit in ("m", "cm", "mm")},
+    "rad/s": {"rad/s": (0.0, 15.0), "deg/s": (0.0, 900.0)},
+    "m/s": {"m/s": (0.0, 15.0), "mm/s": (0.0, 15e3)},
     "percent": {"share": (0.0, 1.1), "percent": (1.1, UNITS["percent"].largest)},
     "opening": {"m": (0.0, 0.3), "cm": (0.0, 30.0), "mm": (0.0, UNITS["mm"].largest)},
     "period": {u: (1 / (_FASTEST * scale), 1 / (_SLOWEST * scale)) for u, scale in SECONDS.items()},
 }
 """Units that angles, lengths and periods may be in, the likeliest first, with the least and the
 greatest number: of angles and lengths the largest one, of periods the time between two frames.
-Ours: no joint turns two turns; above 300, millimetres are likelier than an arm of three metres; no
-gripper opens by 30 cm; one that stays within 1, or hardly beyond, is recorded as a share."""
+Ours: no joint turns two turns, or faster than 15 rad/s; above 300, millimetres are likelier than an
+arm of three metres; no gripper opens by 30 cm; one that stays within 1, or hardly beyond, is
+recorded as a share."""
 _BRACKETS = re.compile(r"(?P<name>.+?)(?: in)?\s*[\[(]\s*(?P<unit>[^\[\]()]+?)\s*[\])]")
 _ENDING = re.compile(r"(?P<name>.+?)(?:[_ ]in)?[_ ](?P<unit>[a-zµμ°]+)")
 _CAMEL = re.compile(r"(?P<name>.*[a-z0-9])(?P<unit>[A-Z][a-z]+|DEG|RAD|MM|CM|MS|US|NS)")
@@ -110,6 +122,7 @@ def conversion(recorded: str, wanted: str, name: str) -> float:
     if scale is None:
         is_word = not spelt(without_number(recorded)[0]) and bool(re.search("[A-Za-z]", recorded))
         example = f"--units {spoken(wanted)[0]}" if is_word else "--units '0.01 deg'"
+        example = "--units deg/s or mm/s" if is_rate(wanted) else example
         raise ConfigurationError(
             f"{name} is recorded in {recorded}, but plans are in {wanted}; say its unit, such as "
             f"{example}, or correct the plan's units"
