@@ -28,6 +28,19 @@ def test_each_channel_is_asked_about_by_its_name_and_numbers(names, end, option)
     assert {*options} == {f"--units {option}"}
 
 
+def test_increments_are_judged_by_the_way_that_they_sum_to():
+    n = len(takes(("dx", "dyaw"), (0, 0))[0].times)
+    some = takes(("dx", "dy", "dyaw"), (400 / n, 20 / n, 60 / n))
+    assert {one.option for one in select(some).ambiguities} == {"--units mm mm deg"}
+    assert select(takes(("dx", "dyaw"), (0.4 / n, 1 / n))).ambiguities == ()
+
+
+def test_speeds_faster_than_an_arm_are_per_second_in_another_unit():
+    (asked,) = select(takes(("vx", "wz"), (0.4, 90))).ambiguities
+    assert asked.option == "--units m/s deg/s"
+    assert select(takes(("vx", "wz"), (0.4, 90)), units=["m/s", "deg/s"]).units == ("m/s", "rad/s")
+
+
 def test_a_matrix_beside_joints_in_degrees_is_neither_angle_nor_percent():
     names = [f"J{i}" for i in range(1, 7)] + [f"R{i}{k}" for i in (1, 2, 3) for k in (1, 2, 3)]
     end = (10, -90, 90, 5, 30, 20, 0.9, -0.3, 0, 0.3, 0.9, 0, 0, 0, 1)

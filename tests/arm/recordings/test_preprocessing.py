@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from prior_reinforce.arm.recordings import import_demonstrations
-from prior_reinforce.arm.recordings.preprocessing import Preprocessing, preprocess
+from prior_reinforce.arm.recordings.preprocessing import Preprocessing, at_rests, preprocess
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.errors import (
@@ -173,6 +173,15 @@ def test_a_drive_at_constant_speed_is_motion_and_a_speed_is_0_once_the_recording
     assert not done.plans[0, -10:].any()
     assert [remark.partition(":")[0] for remark in done.remarks] == ["0", "1"]
     assert all("0.2 m/s" in remark and "pose" not in remark for remark in done.remarks)
+
+
+@pytest.mark.parametrize(("names", "push"), [(("dx", "dy"), 0.01), (("vx", "wz"), 0.2)])
+def test_a_push_at_constant_speed_is_no_rest(names, push):
+    rest, ramp = np.zeros(12), np.linspace(0, 1, 5)
+    w = push * np.concatenate([rest, ramp[1:], np.ones(16), ramp[::-1][1:], rest])
+    speeds = np.tile(np.column_stack([w, 0.3 * w]), (3, 1))
+    log = Recording("log", np.arange(len(speeds)) / 20, speeds, names)
+    assert [len(at_rests(log, rest)) for rest in (0.3, 0.5)] == [3, 3]
 
 
 def test_a_gripper_step_does_not_ring():

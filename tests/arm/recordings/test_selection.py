@@ -40,6 +40,16 @@ def test_what_is_lost_in_a_channel_that_is_not_taken_does_not_count():
     assert selection.left_out == ""
 
 
+def test_a_tools_pose_is_none_of_velocities():
+    q = np.column_stack([np.sin(T), np.cos(T), T])
+    takes = [Recording("throw", T, q, ("tcp_x", "tcp_y", "tcp_z"))]
+    with pytest.raises(InvalidDemonstrationsError, match="--joints tcp_x tcp_y tcp_z") as refused:
+        select(takes, ["x", "y", "z"], ["x", "y", "z"], plan_units=["m"] * 3)
+    assert "velocities" not in str(refused.value)
+    steps = [Recording("throw", T, q, ("d_x", "d_y", "d_z"))]
+    assert select(steps, ["d_x", "d_y"], ["dx", "dy"], plan_units=["rad"] * 2).names == ("dx", "dy")
+
+
 @pytest.mark.parametrize("zero", ["joint0", "rail0"])
 def test_a_joint_before_the_first_that_moves_is_asked_about(zero):
     q = np.column_stack([np.sin(T), np.cos(T), np.sin(2 * T)])

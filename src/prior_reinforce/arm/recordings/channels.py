@@ -12,9 +12,9 @@ from collections.abc import Callable, Iterator, Sequence
 from enum import Enum
 from itertools import takewhile
 
-from prior_reinforce.plans.plan_format import OF_A_TOOL
+from prior_reinforce.plans.plan_format import OF_A_TOOL, PlanFormat
 from prior_reinforce.plans.whole_turns import CIRCLES, TURN, attitudes, euler_angles
-from prior_reinforce.units import base_of
+from prior_reinforce.units import base_of, is_rate
 
 
 class Kind(Enum):
@@ -74,7 +74,7 @@ def _word(words: str) -> str:
 
 _RATE = r"([._ ]?(vel(ocit(y|ies))?|speeds?)[_.\[ ]*\d*\]?)"
 _BY_NAME = (
-    (re.compile(r"(^|.*[^a-z])(d|delta[_. ]?)[xyz]|.*torso_?lift.*", re.IGNORECASE), Kind.LENGTH),
+    (re.compile(r"(^|.*[^a-z])(d_?|delta[_. ]?)[xyz]|.*torso_?lift.*", re.IGNORECASE), Kind.LENGTH),
     (re.compile(rf"(^|.*[^a-z])(v[xyz]|[xyz]{_RATE})", re.IGNORECASE), Kind.VELOCITY),
     (re.compile(rf"(^|.*[^a-z])(w[xyz]|(dq|qd)[_.\[ ]*\d+\]?)|.*{_RATE}", re.I), Kind.TURN_RATE),
     (re.compile(r".*quat(ernion)?[_.\[ ]*\d\]?", re.IGNORECASE), Kind.QUATERNION),
@@ -148,6 +148,18 @@ def kinds(names: Sequence[str]) -> tuple[Kind, ...]:
     for i in [*_place_beside_attitude(names, found)]:
         found[i] = Kind.PLACE
     return tuple(found)
+
+
+def zero_at_rest(names: Sequence[str], units: Sequence[str | None]) -> list[int]:
+    """Return the columns that are 0 at rest: increments, and speeds by their name or their unit."""
+    speeds = (Kind.VELOCITY, Kind.TURN_RATE)
+    return [
+        i
+        for i, (name, unit, kind) in enumerate(zip(names, units, kinds(names), strict=True))
+        if kind in speeds
+        or is_rate(unit or "")
+        or PlanFormat([name], [unit or "1"], 1.0).increments
+    ]
 
 
 def one_for_all(

@@ -19,6 +19,7 @@ from prior_reinforce.arm.recordings.artefacts import (
     refuse_leaps,
     stalls,
 )
+from prior_reinforce.arm.recordings.channels import zero_at_rest
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.time_finder import LONGEST
 from prior_reinforce.arm.recordings.units import say_names
@@ -189,7 +190,8 @@ def _with_poses(recording: Recording, increments: Sequence[int]) -> Recording:
 def at_rests(recording: Recording, rest: float) -> list[Recording]:
     """Cut a recording wherever nothing moves for `rest` in [s], into `NAME-0`, `NAME-1`, ...
 
-    While nothing is recorded, nothing moves: some recorders pause with the arm.
+    While nothing is recorded, nothing moves: some recorders pause with the arm. Increments and
+    speeds are 0 where nothing moves.
     """
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
@@ -199,9 +201,11 @@ def at_rests(recording: Recording, rest: float) -> list[Recording]:
     q = recording.positions[frame]
     if len(q) <= size:
         return [recording]
-    units = [unit or "rad" for unit in recording.units]
+    zero = zero_at_rest(recording.names, recording.units)
+    units = ["" if i in zero else unit or "rad" for i, unit in enumerate(recording.units)]
     band = analyse([recording.positions], units, recording.period).trim_band
     spread = maximum_filter1d(q, size, axis=0) - minimum_filter1d(q, size, axis=0)
+    spread[:, zero] = maximum_filter1d(np.abs(q[:, zero]), size, axis=0)
     still = np.all(spread[size // 2 : len(q) - (size - 1) // 2] <= band, axis=1)
     covered = np.cumsum(np.append(still, np.zeros(size)) - np.append(np.zeros(size), still))
     moves = (covered[: len(q)] == 0).astype(int)
