@@ -5,13 +5,20 @@ import math
 import numpy as np
 import pytest
 
-from prior_reinforce.plans.whole_turns import attitudes, other_form, whole_circles
+from prior_reinforce.plans.whole_turns import attitudes, euler_angles, other_form, whole_circles
 
 
 def test_angles_that_nothing_stops_are_known_by_name_and_unit():
-    names = ("yaw", "tool_roll", "scroll", "Gierwinkel", "heading", "joint1")
-    units = ("rad", "deg", "rad", "deg", "m", "rad")
+    names = ("yaw", "tool_roll", "scroll", "Gierwinkel", "heading", "joint1", "left_wrist_roll")
+    units = ("rad", "deg", "rad", "deg", "m", "rad", "rad")
     assert whole_circles(names, units) == ("yaw", "tool_roll", "Gierwinkel")
+
+
+def test_joints_of_a_limb_are_no_attitude():
+    angles = ("roll", "pitch", "yaw")
+    for of, is_one in (("tool_", True), ("left_shoulder_", False), ("", True), ("waist_", False)):
+        names = [of + angle for angle in angles]
+        assert euler_angles(names, ("rad",) * 3) == ((tuple(names),) if is_one else ())
 
 
 @pytest.mark.parametrize(

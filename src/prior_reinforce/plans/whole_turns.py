@@ -21,6 +21,11 @@ HALF = 0.01
 one frame."""
 CIRCLES = r"yaw|roll|heading|azimuth?|bearing|gier(winkel)?|roll(winkel)?"
 """Names of angles that nothing stops."""
+_OF_A_LIMB = re.compile(
+    r"shoulder|elbow|arm[^a-z]|wrist|waist|torso|hip[^a-z]|neck|ankle|knee|schulter|hand_?gelenk",
+    re.IGNORECASE,
+)
+"""Limbs, of which `_roll`, `_pitch` and `_yaw` are joints with stops, and no Euler angles."""
 _WHOLE_CIRCLE = re.compile(rf"(^|[^a-z])({CIRCLES})($|[^a-z])", re.IGNORECASE)
 _QUATERNION = re.compile(r"(?P<stem>.*?)(?P<part>(?<![a-z])q[._]?[xyzw]|[._ /]?[xyzw])", re.I)
 _OF_ATTITUDE = re.compile(r"quat|orient|rot|attitude|(^|[^a-z])q$", re.IGNORECASE)
@@ -37,7 +42,8 @@ Frames = TypeVar("Frames", bound=np.ndarray)
 def whole_circles(names: Sequence[str], units: Sequence[str]) -> tuple[str, ...]:
     """Return the angles that nothing stops, by their names: yaw, roll, heading."""
     pairs = zip(names, units, strict=True)
-    return tuple(n for n, unit in pairs if unit in TURN and _WHOLE_CIRCLE.search(n))
+    circles = [n for n, unit in pairs if unit in TURN and _WHOLE_CIRCLE.search(n)]
+    return tuple(name for name in circles if not _OF_A_LIMB.search(name))
 
 
 def attitudes(names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
@@ -79,7 +85,8 @@ def euler_angles(names: Sequence[str], units: Sequence[str]) -> tuple[tuple[str,
         groups: dict[str, dict[str, str]] = {}
         for name, unit in zip(names, units, strict=True):
             word = _last_word(name)
-            if unit in TURN and word is not None and word[1] in letters:
+            of_a_limb = word is not None and _OF_A_LIMB.search(word[0])
+            if unit in TURN and word is not None and word[1] in letters and not of_a_limb:
                 groups.setdefault(word[0], {})[word[1]] = name
         for group in groups.values():
             if len(group) == 3:

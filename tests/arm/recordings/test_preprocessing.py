@@ -175,6 +175,15 @@ def test_a_drive_at_constant_speed_is_motion_and_a_speed_is_0_once_the_recording
     assert all("0.2 m/s" in remark and "pose" not in remark for remark in done.remarks)
 
 
+@pytest.mark.parametrize(("missing", "said"), [([18, 19, 25], "3 of 60 frames"), ([2, 3], "")])
+def test_the_way_of_missing_increments_is_said_to_be_missing(missing, said):
+    t = np.arange(60) / 20
+    steps = 0.01 * np.interp(t, [0.5, 1.0, 1.5, 2.0], [0.0, 1.0, 1.0, 0.0])[:, None]
+    log = recording(np.delete(t, missing), np.delete(steps, missing, axis=0))
+    remarks = preprocess([log], ("m",), Preprocessing(trim=False), [0]).remarks
+    assert [said in remark for remark in remarks if "way" in remark] == [True] * bool(said)
+
+
 @pytest.mark.parametrize(("names", "push"), [(("dx", "dy"), 0.01), (("vx", "wz"), 0.2)])
 def test_a_push_at_constant_speed_is_no_rest(names, push):
     rest, ramp = np.zeros(12), np.linspace(0, 1, 5)

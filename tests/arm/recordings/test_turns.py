@@ -161,6 +161,13 @@ def test_a_quaternion_in_counts_is_refused_by_its_length():
         brought_together(("qw", "qx", "qy", "qz"), None, [counts])
 
 
+def test_a_joint_that_may_have_stops_stays_in_the_turn_in_which_it_is_recorded():
+    for name, stays in (("left_wrist_roll", True), ("joint4", True), ("tool_yaw", False)):
+        own = [(start + way * S)[:, None] for start, way in ((170.0, 25.0), (-170.0, -20.0))]
+        read, _ = brought_together((name,), "deg", own)
+        assert (np.ptp([motion[0, 0] for motion in read]) > 300) == stays
+
+
 def test_a_wrist_that_counts_a_turn_a_throw_is_brought_to_one_turn():
     spins = [(0.1 + 0.5 * T + 2 * np.pi * k)[:, None] for k in (0, 1, 1, 1, 1, 5)]
     read, said = brought_together(("joint1",), "rad", spins)

@@ -42,6 +42,8 @@ splines leave the range of noise by about as much as there is noise. Ours."""
 _BEGINS = 1e-3
 """Part of the fastest step of its unit above which a channel leaves its rest, noise aside. Ours: a
 plan that begins a little faster leaps from rest, and breaks limits of jerk."""
+_LITTLE_WAY = 0.01
+"""Part of the largest increment below which nothing moves. Ours: noise is less."""
 _WHOLE_RATE = 0.005
 """A median period this share from a whole rate is that rate. Ours: clocks drift by less."""
 _GAP = 3
@@ -183,8 +185,22 @@ def preprocess(
 
 def _with_poses(recording: Recording, increments: Sequence[int]) -> Recording:
     """The recording with poses in place of increments; the last is reached a period later."""
-    times = np.append(recording.times, recording.duration + recording.period)
-    return replace(recording, times=times, positions=summed(recording.positions, increments))
+    t, q, period = recording.times, recording.positions, recording.period
+    ways = np.abs(q[:, list(increments)])
+    moving = np.any(ways > _LITTLE_WAY * ways.max(axis=0), axis=1)
+    late = np.rint(np.diff(t) / period).astype(int) - 1
+    lost = int(late[moving[1:] | moving[:-1]].clip(0).sum())
+    remark = (
+        f"{lost} of {len(t) + lost} frames are missing in mid-motion, and their way with them, as "
+        "increments say it frame by frame: leave the recording out (--leave-out), or write the "
+        "frames that are missing"
+    )
+    return replace(
+        recording,
+        times=np.append(t, recording.duration + period),
+        positions=summed(q, increments),
+        remarks=(*recording.remarks, *[remark][:lost]),
+    )
 
 
 def at_rests(recording: Recording, rest: float) -> list[Recording]:

@@ -273,8 +273,9 @@ class _Together:
         }
         is_arm = len(turning) >= _JOINTS
         upwards = is_arm and all(np.all(motion[:, [*turning]] >= 0) for motion in self.motions)
+        circles = {*euler, *joints, *form.periodic}
         for i, known in turning.items():
-            yield from self.take_turns(i, known=known)
+            yield from self.take_turns(i, known=known, circle=form.names[i] in circles)
         starts = {i: min(motion[0, i] for motion in self.motions) for i in turning}
         high = [i for i, start in starts.items() if start > TURN[form.units[i]] / 2]
         if upwards and high:
@@ -322,10 +323,12 @@ class _Together:
             if those:
                 yield f"{listed(those)}: {what} {says}"
 
-    def take_turns(self, channel: int, *, known: bool) -> Iterator[str]:
+    def take_turns(self, channel: int, *, known: bool, circle: bool) -> Iterator[str]:
         """Continue an angle across the end of its range, and start all episodes in one turn.
 
-        What is not `known` to be an angle is one where it passes the end of a range smoothly.
+        What is not `known` to be an angle is one where it passes the end of a range smoothly. What
+        is no `circle` may have stops, and another turn of it be no pose: it stays in its turn,
+        unless the starts are over a turn apart, as counted turns are.
         """
         name, unit = self.form.names[channel], self.form.units[channel]
         limits = _range(name, self.limits)
@@ -347,9 +350,9 @@ class _Together:
                 )
         if passed:
             yield f"{listed(passed)}: {name} passes the end of its range, and is continued"
-        elif not known:
-            return
         spans = np.array([[values[0], values.min(), values.max()] for values in own])
+        if not passed and not (known and (circle or np.ptp(spans[:, 0]) > turn)):
+            return
         shifts = _shifts(spans, turn, *limits, self.fixed)
         if shifts is None:
             raise InvalidDemonstrationsError(
