@@ -85,6 +85,13 @@ def test_slow_seconds_are_taken_when_said():
     assert clock.period == 1
 
 
+def test_key_frames_of_a_throw_are_in_seconds():
+    stamps = np.array([0, 0.4, 0.65, 0.9, 1.15, 1.4, 1.99])
+    clock = clock_of("a", 7, stamps=stamps, name="t")
+    assert [doubt.option for doubt in clock.ambiguities] == ["--time-unit s"]
+    assert clock.times[-1] == pytest.approx(1.99)
+
+
 def test_a_column_that_counts_frames_needs_the_rate():
     clock = clock_of("a", 3, stamps=np.array([7, 8, 10]), name="t", time_unit="frame", rate=100)
     np.testing.assert_allclose(clock.times - clock.times[0], [0, 0.01, 0.03])

@@ -9,6 +9,7 @@ from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.selection import select
 from prior_reinforce.arm.recordings.takes import (
     all_return,
+    increments_unsaid,
     doubts_of_times,
     odd_starts,
     pauses,
@@ -177,6 +178,26 @@ def test_what_stands_still_may_stand_anywhere():
     noise = np.random.default_rng(0).normal(0, 1e-4, (6, 40))
     near = [np.column_stack([1.5 + 0.01 * (i % 2) + n, 10 + 75 * S]) for i, n in enumerate(noise)]
     assert said(near) == []
+
+
+@pytest.mark.parametrize(
+    ("key", "names", "told"),
+    [
+        ("actions", ("x", "y", "z", "roll", "pitch", "yaw", "gripper"), True),
+        ("action", ("x", "y", "z"), True),
+        ("qpos", ("x", "y", "z"), False),
+        ("action", ("dx", "dy", "dz"), False),
+    ],
+)
+def test_actions_that_are_0_at_both_ends_may_be_increments(key, names, told):
+    steps = np.diff(S, append=S[-1])[:, None] * np.linspace(1, 0.5, len(names))
+    steps[:, 6:] = S[:, None] > 0.5
+    some = [Recording(f"t{i}", np.arange(len(S)) / 20, steps, names) for i in range(2)]
+    asked = increments_unsaid(some, [key])
+    assert [one.option for one in asked] == [f"--joints {' '.join(names)}"] * told
+    assert all("--action-names dx dy dz" in one.what for one in asked)
+    poses = [Recording("t", np.arange(len(S)) / 20, S[:, None] * np.ones(3), ("x", "y", "z"))]
+    assert increments_unsaid(poses, [key]) == ()
 
 
 @pytest.mark.parametrize(

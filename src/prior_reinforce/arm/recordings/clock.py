@@ -374,7 +374,12 @@ def _judge(
     what = f"{name} in {unit}{as_said} would be {rate_in(unit)}, "
     if looks is None:
         return "s", (Ambiguity(f"{what}and no other unit fits better", "--time-unit s"),)
-    what += f"in {looks} {rate_in(looks)}: it looks like {looks}"
+    what += f"in {looks} {rate_in(looks)}"
+    too_short = is_throw(length) and not is_throw(length * SECONDS[looks])
+    if said is None and period != 1 and too_short:
+        what += f", which no throw is; it looks like key frames in {unit}"
+        return unit, (Ambiguity(what, f"--time-unit {unit}"),)
+    what += f": it looks like {looks}"
     is_counter = COUNTER.search(name.lower()) is not None
     is_time = says_time(name) or name.lower() in SECONDS
     brief = numbers[0] in (0, 1) and length * SECONDS[looks] < _BRIEF

@@ -33,7 +33,13 @@ from prior_reinforce.arm.recordings.preprocessing import Preprocessing, at_rests
 from prior_reinforce.arm.recordings.preview import Preview
 from prior_reinforce.arm.recordings.recording import Episodes, Recording, has_files
 from prior_reinforce.arm.recordings.selection import Selection, select
-from prior_reinforce.arm.recordings.takes import doubts_of_times, pauses, several_throws, ways_back
+from prior_reinforce.arm.recordings.takes import (
+    doubts_of_times,
+    increments_unsaid,
+    pauses,
+    several_throws,
+    ways_back,
+)
 from prior_reinforce.arm.recordings.units import Ambiguity, raise_if_ambiguous
 from prior_reinforce.arm.robots.gate_settings import GateSettings
 from prior_reinforce.arm.robots.limits import RobotLimits
@@ -237,7 +243,8 @@ class Recordings:
         units, shares = (self.options.units, wanted.plan_units), self.format == "lerobot"
         selection = select(self.episodes, joints, names, *units, normalised=shares)
         said = pauses(selection.recordings) if self.options.rests is None else ()
-        unclear = self.ambiguities + selection.ambiguities
+        unsaid = increments_unsaid(selection.recordings, self.options.key or ()) * (names is None)
+        unclear = self.ambiguities + selection.ambiguities + unsaid
         return replace(selection, ambiguities=unclear, remarks=(*selection.remarks, *said))
 
     def outcomes(

@@ -5,6 +5,7 @@ Nothing is converted by what another take states: what may be in another unit is
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -13,7 +14,7 @@ from itertools import chain, pairwise
 import numpy as np
 from jaxtyping import Float
 
-from prior_reinforce.arm.recordings.channels import Kind
+from prior_reinforce.arm.recordings.channels import Kind, kinds, zero_at_rest
 from prior_reinforce.arm.recordings.judging import Belief
 from prior_reinforce.arm.recordings.preprocessing import at_rests
 from prior_reinforce.arm.recordings.recording import Recording
@@ -41,6 +42,14 @@ _WITHIN = 0.2
 """Part of the gap between two groups by which starts within one may differ. Ours."""
 _BACK = 0.1
 """Part of its range that a joint may be off where a motion goes back to a start. Ours."""
+
+_AT_ZERO = 0.02
+"""Part of its largest number at which a column is 0. Ours."""
+_OF_INCREMENTS = {
+    n: ("dx", "dy", "dz", *("drx", "dry", "drz")[: 3 * (n > 5)], *("gripper",) * (n in (4, 7)))
+    for n in (3, 4, 6, 7)
+}
+"""What increments of a tool's pose are called, by how many there are."""
 
 _REST, _MOST_MOTIONS = 0.5, 3
 """Rest in [s] after which another throw may begin, and motions of one throw: there and back, with a
@@ -283,6 +292,36 @@ def several_throws(recording: Recording) -> tuple[Ambiguity, ...]:
         "looks like several throws (if it is one: --rests 0)"
     )
     return (Ambiguity(what, f"--rests {_REST:g}"),) * (count > _MOST_MOTIONS)
+
+
+def increments_unsaid(
+    recordings: Sequence[Recording], keys: Sequence[str]
+) -> tuple[Ambiguity, ...]:
+    """Ask where actions may be increments of a tool's pose: all but a gripper rest at 0.
+
+    `keys` are what the motion is called in its file; robomimic, LIBERO, ManiSkill and Open-X call
+    increments `actions` or `action`.
+    """
+    names = recordings[0].columns
+    told = {*zero_at_rest(names, recordings[0].units)}
+    each = np.array([np.abs(r.positions[[0, -1]]).max(axis=0) for r in recordings])
+    largest = np.array([np.abs(r.positions).max(axis=0) for r in recordings]).max(axis=0)
+    at_zero = np.all(each <= _AT_ZERO * largest, axis=0)
+    moving = at_zero & (largest > 0)
+    called = any(re.search(r"(^|[^a-z])actions?($|[^a-z])", key) for key in (*keys, *names))
+    few = np.count_nonzero(moving) < 2 or np.count_nonzero(~at_zero) > 1
+    if told or few or not called or len(names) not in _OF_INCREMENTS:
+        return ()
+    new = _OF_INCREMENTS[len(names)]
+    units = shlex.join([kind.usual_unit(1.0) for kind in kinds(new)])
+    what = (
+        f"{say_names(names)} are 0 at both ends of every motion, as increments from frame to frame "
+        "are: if these are some, make the workspace anew (prior-reinforce new WORKSPACE --robot "
+        f"none --action-names {shlex.join(new)} --action-units {units}) and import with --joints "
+        f"{shlex.join(names)} (where -1 to 1 is a controller's largest step, such as 5 cm, "
+        "with --units '0.05 m' ...); if they are positions, import here"
+    )
+    return (Ambiguity(what, f"--joints {shlex.join(names)}", guessed=False),)
 
 
 def pauses(recordings: Sequence[Recording]) -> Iterator[str]:
