@@ -9,8 +9,8 @@ from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.selection import select
 from prior_reinforce.arm.recordings.takes import (
     all_return,
-    increments_unsaid,
     doubts_of_times,
+    increments_unsaid,
     odd_starts,
     pauses,
     ways_back,

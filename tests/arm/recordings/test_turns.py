@@ -168,6 +168,14 @@ def test_a_joint_that_may_have_stops_stays_in_the_turn_in_which_it_is_recorded()
         assert (np.ptp([motion[0, 0] for motion in read]) > 300) == stays
 
 
+def test_a_gripper_beside_increments_is_no_part_of_a_quaternion():
+    closed = np.where(T < 0.5, -1.0, 1.0)
+    own = [np.column_stack([0 * T, 0 * T, (0.01 + 0.001 * i) * S, closed]) for i in range(N)]
+    read, said = brought_together(("drx", "dry", "drz", "gripper"), None, own)
+    assert np.ptp(read[0][:, 3]) == np.ptp(closed), said
+    assert said == ""
+
+
 def test_a_wrist_that_counts_a_turn_a_throw_is_brought_to_one_turn():
     spins = [(0.1 + 0.5 * T + 2 * np.pi * k)[:, None] for k in (0, 1, 1, 1, 1, 5)]
     read, said = brought_together(("joint1",), "rad", spins)

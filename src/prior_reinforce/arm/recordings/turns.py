@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from prior_reinforce.arm.recordings.channels import Kind, kinds
+from prior_reinforce.arm.recordings.channels import Kind, kinds, zero_at_rest
 from prior_reinforce.arm.recordings.selection import Selection
 from prior_reinforce.arm.recordings.takes import so_far
 from prior_reinforce.arm.robots.limits import RobotLimits, joint_of, with_turns
@@ -90,8 +90,10 @@ def aligned(
     form = replace(form, attitudes=tuple(kept))
     if before is not None:
         form = replace(before.format, dt=1.0)
+    none = [n for n, kind in zip(form.names, kinds(form.names), strict=True) if kind is Kind.TOOL]
+    none += [form.names[i] for i in zero_at_rest(form.names, form.units)]
     for size, are in ((4, _are_quaternions), (3, _take_two_forms)):
-        taken = {*form.periodic, *chain(*form.attitudes)}
+        taken = {*form.periodic, *chain(*form.attitudes), *none}
         unnamed = _consecutive(form, motions, size, taken, are)
         form = replace(form, attitudes=(*form.attitudes, *unnamed))
     said = list(_Together(form, episodes, motions, limits, len(shown)).align(degrees))
