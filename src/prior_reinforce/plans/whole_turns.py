@@ -43,7 +43,12 @@ def whole_circles(names: Sequence[str], units: Sequence[str]) -> tuple[str, ...]
     """Return the angles that nothing stops, by their names: yaw, roll, heading."""
     pairs = zip(names, units, strict=True)
     circles = [n for n, unit in pairs if unit in TURN and _WHOLE_CIRCLE.search(n)]
-    return tuple(name for name in circles if not _OF_A_LIMB.search(name))
+    return tuple(name for name in circles if not is_of_a_limb(name))
+
+
+def is_of_a_limb(name: str) -> bool:
+    """Return whether an angle is of a limb's joint, which has stops: `left_wrist_roll`."""
+    return _OF_A_LIMB.search(name) is not None
 
 
 def attitudes(names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
@@ -85,7 +90,7 @@ def euler_angles(names: Sequence[str], units: Sequence[str]) -> tuple[tuple[str,
         groups: dict[str, dict[str, str]] = {}
         for name, unit in zip(names, units, strict=True):
             word = _last_word(name)
-            of_a_limb = word is not None and _OF_A_LIMB.search(word[0])
+            of_a_limb = word is not None and is_of_a_limb(word[0])
             if unit in TURN and word is not None and word[1] in letters and not of_a_limb:
                 groups.setdefault(word[0], {})[word[1]] = name
         for group in groups.values():

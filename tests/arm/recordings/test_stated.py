@@ -1,5 +1,7 @@
 """Names, units, rates and lengths are told by what they hold, whatever they are called."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from prior_reinforce.arm.recordings.stated import (
     frames_said,
     motion_keys,
     names_said,
+    recorded_among,
     units_said,
 )
 from prior_reinforce.errors import FileFormatError
@@ -132,3 +135,22 @@ def test_truth_values_are_no_motion():
 def test_an_only_array_that_is_called_an_outcome_is_named_as_what_may_be_the_motion():
     with pytest.raises(FileFormatError, match=r"\['landing_q'\].*--key"):
         motion_keys("a.npz", ReadOptions(), {"landing_q": Q}, ("q",))
+
+
+def test_a_motion_far_from_its_own_statistics_is_normalised():
+    motion = Q + np.array([2.0, -2.0, 1.0])
+    mean, std = motion.mean(axis=0), motion.std(axis=0)
+    normalised = (motion - mean) / std
+
+    def read(motion, options, **said):
+        arrays = {"q": motion, "t": np.arange(len(motion)) / 50}
+        return recorded_among(
+            Path("a.npz"), "0", ("q",), arrays, options, texts={}, stated=said, names=UR
+        )
+
+    ends = {"q_min": motion.min(axis=0), "q_max": motion.max(axis=0)}
+    for said in ({"mean": mean, "std": std}, ends):
+        read(motion, ReadOptions(), **said)
+        with pytest.raises(FileFormatError, match="before it was normalised"):
+            read(normalised, ReadOptions(), **said)
+        read(normalised, ReadOptions(units=["rad"]), **said)

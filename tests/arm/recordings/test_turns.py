@@ -162,7 +162,7 @@ def test_a_quaternion_in_counts_is_refused_by_its_length():
 
 
 def test_a_joint_that_may_have_stops_stays_in_the_turn_in_which_it_is_recorded():
-    for name, stays in (("left_wrist_roll", True), ("joint4", True), ("tool_yaw", False)):
+    for name, stays in (("left_wrist_roll", True), ("forearm_roll", True), ("tool_yaw", False)):
         own = [(start + way * S)[:, None] for start, way in ((170.0, 25.0), (-170.0, -20.0))]
         read, _ = brought_together((name,), "deg", own)
         assert (np.ptp([motion[0, 0] for motion in read]) > 300) == stays

@@ -54,6 +54,9 @@ _UNIT = re.compile(r"((joint|angle|angular|position|motion|rotation)s?_?)?units?
 _SOUND, _FASTER = 1_000_000, 20
 """Numbers of what moves at another rate than the motion, at most, and how many times the motion's,
 if that is more. Ours: sound has more."""
+_FAR_OFF, _SLACK = 5.0, 0.01
+"""Standard deviations by which the middle of a motion is off what is said of its mean, and rounding
+of what is said. Ours: a motion is one of those of which it is said."""
 _MOST_SAID = 1_000_000
 """Bytes of a JSON beside a table at most. Ours: it says what the columns are."""
 
@@ -141,6 +144,8 @@ def recorded_among(
         for each in (arrays, stated)
     )
     positions, known = _joined(where, keys, arrays, texts, options.joints)
+    if options.units is None:
+        _refuse_normalised(f"{where}: {episode}", positions, {**stated, **arrays})
     bare, units = without_units(names or known)
     if not bare and len(positions) > 1:
         refuse_exchanged(episode, positions)
@@ -155,6 +160,30 @@ def recorded_among(
         unclear = _other_names(episode, texts, positions.shape[1], options.joints or ())
         more["ambiguities"] = (*clock.ambiguities, *unclear)
     return recorded(episode, clock, positions, bare, units=units, **more)
+
+
+def _refuse_normalised(where: str, positions: np.ndarray, stated: Mapping[str, Any]) -> None:
+    """FileFormatError if the motion is far from what the file says of its mean or its range."""
+    for words in (("mean", "std"), ("min", "max")):
+        said = [
+            np.ravel(numbers)
+            for word in words
+            for name, numbers in stated.items()
+            if re.search(rf"(^|[^a-z]){word}$", name.lower())
+            and np.size(numbers) == positions.shape[1]
+            and np.asarray(numbers).dtype.kind in "fiu"
+        ]
+        if len(said) != len(words):
+            continue  # none, or of several arrays
+        one, two = said
+        low, high = (one - _FAR_OFF * two, one + _FAR_OFF * two) if words[0] == "mean" else said
+        middle = np.nanmedian(positions, axis=0)
+        if np.any((middle < low - _SLACK) | (middle > high + _SLACK)):
+            raise FileFormatError(
+                f"{where} says {' and '.join(words)} of its columns, and the motion is far from "
+                "these: write it as it was before it was normalised; or if it is not, say its unit "
+                "with --units"
+            )
 
 
 def _other_names(

@@ -28,6 +28,7 @@ from prior_reinforce.plans.whole_turns import (
     HALF,
     TURN,
     euler_angles,
+    is_of_a_limb,
     other_euler_forms,
     other_form,
 )
@@ -275,9 +276,10 @@ class _Together:
         }
         is_arm = len(turning) >= _JOINTS
         upwards = is_arm and all(np.all(motion[:, [*turning]] >= 0) for motion in self.motions)
-        circles = {*euler, *joints, *form.periodic}
         for i, known in turning.items():
-            yield from self.take_turns(i, known=known, circle=form.names[i] in circles)
+            yield from self.take_turns(
+                i, known=known, circle=form.names[i] in joints or not is_of_a_limb(form.names[i])
+            )
         starts = {i: min(motion[0, i] for motion in self.motions) for i in turning}
         high = [i for i, start in starts.items() if start > TURN[form.units[i]] / 2]
         if upwards and high:
