@@ -361,3 +361,11 @@ def test_a_total_of_samples_is_no_length_of_an_episode(tmp_path):
     q = np.cumsum(np.full((5, 100, 7), 0.01), axis=1)
     np.savez(tmp_path / "all.npz", q=q, t=0.02 * np.arange(100), num_samples=500)
     assert len(read_recordings(tmp_path / "all.npz")) == 5
+
+
+def test_chunks_of_actions_are_no_episodes(tmp_path):
+    t, q = sampled(0, 50)
+    ahead = np.minimum(np.arange(len(q))[:, None] + np.arange(8), len(q) - 1)
+    np.savez(tmp_path / "throw_0.npz", actions=q[ahead], t=t)
+    with pytest.raises(FileFormatError, match=r"chunks of 8 actions.*actions\[:, 0\]"):
+        read_recordings(tmp_path)

@@ -78,6 +78,12 @@ def _episodes(path: Path, arrays: Arrays, name: str, options: ReadOptions) -> Ep
     motions = arrays[keys[0]]
     outcomes = next((arrays[name] for name in _OUTCOME_KEYS if name in arrays), None)
     episodes, several = [name], motions.ndim == 3
+    chunks = several and len(motions) > motions.shape[1] > 1
+    if chunks and np.array_equal(motions[1:, 0], motions[:-1, 1]):  # a frame later, the next action
+        raise FileFormatError(
+            f"{path}: {keys[0]} of shape {motions.shape} looks like chunks of {motions.shape[1]} "
+            f"actions a frame: write the first of each, {keys[0]}[:, 0], or name another by --key"
+        )
     if not several:
         motions, outcomes = motions[None], None if outcomes is None else outcomes.reshape(1, -1)
     else:
