@@ -158,7 +158,7 @@ def zero_at_rest(names: Sequence[str], units: Sequence[str | None]) -> list[int]
         for i, (name, unit, kind) in enumerate(zip(names, units, kinds(names), strict=True))
         if kind in speeds
         or is_rate(unit or "")
-        or PlanFormat([name], [unit or "1"], 1.0).increments
+        or PlanFormat((name,), (unit or "1",), 1.0).increments
     ]
 
 

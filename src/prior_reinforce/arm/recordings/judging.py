@@ -93,8 +93,9 @@ def beliefs_of(
     plan_units: Sequence[str] | None,
 ) -> list[Belief]:
     """Return what is believed of each channel, whose plan is in its base unit if nobody says."""
-    usual = [base_of(u or k.usual_unit(0.0))[0] for u, k in zip(stated, kinds(names), strict=True)]
-    form = PlanFormat(names, plan_units or usual, 1.0)
+    pairs = zip(stated, kinds(names), strict=True)
+    units = plan_units or [unit or kind.usual_unit(0.0) for unit, kind in pairs]
+    form = PlanFormat(tuple(names), tuple(units), 1.0)
     poses = [summed(r.positions, form.increments) for r in recordings]  # what increments lead to
     reach = np.array([np.abs(pose).max(axis=0) for pose in poses])
     takes = [r.episode for r in recordings]
