@@ -143,9 +143,9 @@ def analyse(
     steps = [np.abs(np.diff(motion, axis=0)) for motion in motions]
     slow = END_STEP * np.max([step.max(axis=0) for step in steps], axis=0)
     profiles = velocity_profiles(motions, units, SMOOTHING / dt)
-    held = held_channels([summed(motion, increments) for motion in motions], units)
+    poses = [summed(motion, increments) for motion in motions] if len(increments) else motions
     return Signals(
-        kinds=_kinds(motions, steps, held, sigma),
+        kinds=_kinds(motions, steps, held_channels(poses, units), sigma),
         noise=sigma,
         trim_band=np.maximum(_TRIM_SHARE * largest_of_unit(largest, units), counts),
         pose_band=np.maximum(_POSE_SHARE * largest_of_unit(ranges, units), _NOISE_PEAK * sigma),
