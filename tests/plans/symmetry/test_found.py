@@ -15,10 +15,10 @@ from prior_reinforce.plans.symmetry.found import find_turn
 FORM = PlanFormat(("base", "lift", "grip"), ("rad", "rad", "1"), 0.02)
 
 
-def throws(n=6, *, way=1.0, centre=(0.0, 0.0), off=0.0, form=FORM, slope=1.0, seed=0):
+def throws(n=6, *, way=1.0, ahead=0.0, centre=(0.0, 0.0), off=0.0, form=FORM, slope=1.0):
     """Swings of `lift` whose `base` is turned by the outcome's bearing about an axis."""
-    rng = np.random.default_rng(seed)
-    bearing, distance = rng.uniform(-0.5, 0.5, n), rng.uniform(0.8, 1.2, n)
+    rng = np.random.default_rng(0)
+    bearing, distance = ahead + rng.uniform(-0.5, 0.5, n), rng.uniform(0.8, 1.2, n)
     place = distance[:, None] * np.column_stack([np.cos(bearing), np.sin(bearing)]) + centre
     s = np.linspace(0, 1, 50)
     swing = 10 * s**3 - 15 * s**4 + 6 * s**5
@@ -39,6 +39,15 @@ def test_a_first_joint_that_follows_the_bearing_is_a_turn_about_the_base(way, n)
     plan = throws().plans[0]
     moved = found.move(plan, np.array([0.0, 0.3]))
     np.testing.assert_allclose(moved - plan, [[way * 0.3, 0, 0]] * len(plan), atol=1e-12)
+
+
+@pytest.mark.parametrize("ahead", [0.0, 2.75, np.pi, -np.pi / 2])
+def test_throws_may_go_anywhere_about_the_base(ahead):
+    made = pr.make_generator("auto").fit(throws(ahead=ahead), seed=0)
+    for off in (-0.6, -0.04, 0.04, 0.3):
+        bearing = ahead + off
+        (plan,) = made.generate([[np.cos(bearing), np.sin(bearing)]])
+        assert plan[0, 0] == pytest.approx(0.7 + bearing, abs=1e-3)
 
 
 @pytest.mark.parametrize(

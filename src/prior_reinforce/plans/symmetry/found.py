@@ -44,6 +44,7 @@ def find_turn(demonstrations: Demonstrations) -> Symmetry | None:
         return None
     others = (Learned(),) * (form.outcome_dim - 2)
     symmetry = turn_and_scale(TurnJoint(joint, way), (0.0, 0.0), Learned(), others)
+    symmetry = symmetry.around(demonstrations.outcomes_seen)
     anchors = Anchors(symmetry, demonstrations.outcomes_seen, demonstrations.outcome_noise)
     return symmetry if anchors.mixed else None
 
