@@ -59,7 +59,8 @@ def test_units_of_one_kind_convert():
             1,
             ("rad/s", "rad/sec", "m/sec", "mm/min", "rpm", "rad s^-1", "rad s⁻¹", "°/s", "m per s"),
         ),
-        (2, ("m/s^2", "m/s²", "m/s/s", "rad s-2")),
+        (1, ("0.229 rpm", "0.229rpm", "0.01 deg/s", "dps", "RPM", "M/S")),
+        (2, ("m/s^2", "m/s²", "m/s/s", "rad s-2", "rpm/s")),
     ],
 )
 def test_rates_and_accelerations_are_told_by_their_units(powers, units):
@@ -72,11 +73,30 @@ def test_forces_and_torques_are_told_by_their_units():
 
 
 def test_a_rate_is_per_time():
-    units = ["m/s", "rad/sec", "deg/min", "rpm", "counts/turn", "m", "1", "percent"]
+    units = ["m/s", "rad/sec", "deg/min", "rpm", "counts/turn", "m", "1", "percent", "m/s^2"]
     assert rates(units) == [0, 1, 2, 3]
     assert factor("deg/s", "rad/sec") == pytest.approx(math.pi / 180)
     assert factor("mm/s", "m/min") == pytest.approx(0.06)
     assert factor("deg", "rad/s") is None
+
+
+@pytest.mark.parametrize(
+    ("unit", "wanted", "times"),
+    [
+        ("rpm", "rad/s", math.pi / 30),
+        ("0.229 rpm", "rad/s", 0.229 * math.pi / 30),
+        ("rps", "deg/s", 360.0),
+        ("dps", "rad s^-1", math.pi / 180),
+        ("0.01 deg/s", "dps", 0.01),
+        ("m per min", "m/s", 1 / 60),
+        ("cm/s^2", "m/s/s", 0.01),
+        ("counts s^-1", "counts/s", 1.0),
+        ("m/s^2", "m/s", None),
+        ("rpm", "rev", None),
+    ],
+)
+def test_rates_convert_however_they_are_written(unit, wanted, times):
+    assert factor(unit, wanted) == (times if times is None else pytest.approx(times))
 
 
 def test_people_say_centimetres_milliseconds_and_degrees():

@@ -104,8 +104,11 @@ SPELT = {
 
 
 _TIME = f"({'|'.join(spelling for spelling, name in SPELT.items() if UNITS[name].kind == 'time')})"
-_PER_TIME = re.compile(rf"(/|\bper) *\(?{_TIME}(?![a-z])\^?(?P<over>\d?)|\W{_TIME}\^?-(?P<up>\d)")
-_RATE = re.compile("rpm|rps|dps")
+_PER_TIME = re.compile(
+    rf"(/|\bper) *\(?{_TIME}(?![a-z])\^?(?P<over>\d?)|\W{_TIME}\^?-(?P<up>\d)", re.IGNORECASE
+)
+_RATES = {"rpm": "rev/min", "rps": "rev/s", "dps": "deg/s"}
+_RATE = re.compile(rf"(?<![a-z])({'|'.join(_RATES)})(?![a-z])", re.IGNORECASE)
 _FORCE = re.compile(r"[km]?n\W?([cm]?m)?")
 _NUMBERED = re.compile(r"(\d*\.?\d+) *([^\d\s.].*)")
 """A number before a unit: a motor's `0.01 deg`."""
@@ -134,19 +137,27 @@ def kind_of(unit: str) -> str:
 
 def per_time(unit: str) -> int:
     """Return how often a unit is divided by time: 0 for m, 1 for rad s^-1 and rpm, 2 for m/s^2."""
-    text = _plain(unit)
-    powers = [int(match["over"] or match["up"] or 1) for match in _PER_TIME.finditer(text)]
-    return 1 if _RATE.fullmatch(text) else sum(powers)
+    return len(_over_time(unit)[1])
+
+
+def _over_time(unit: str) -> tuple[str, list[str]]:
+    """What is divided by time, and each unit of time that it is divided by: `m`, `s` and `s`."""
+    text = _RATE.sub(lambda match: _RATES[match[0].lower()], _plain(unit))
+    times: list[str] = []
+    for match in _PER_TIME.finditer(text):
+        _, over, power, raised, power_below = match.groups()
+        times += [SPELT[(over or raised).lower()]] * int(power or power_below or 1)
+    return _PER_TIME.sub("", text).strip(" ()[]") if times else unit, times
 
 
 def is_force(unit: str) -> bool:
     """Whether a unit is of forces or torques: N, Nm, N cm."""
-    return _FORCE.fullmatch(_plain(unit)) is not None
+    return _FORCE.fullmatch(_plain(unit).lower()) is not None
 
 
 def _plain(unit: str) -> str:
-    """A unit in lower case, without raised digits."""
-    return unicodedata.normalize("NFKC", unit).replace("\u2212", "-").lower().strip()
+    """A unit without raised digits."""
+    return unicodedata.normalize("NFKC", unit).replace("\u2212", "-").strip()
 
 
 def is_rate(unit: str) -> bool:
@@ -166,12 +177,10 @@ def units_of(kind: Kind) -> dict[str, float]:
 
 def base_of(unit: str) -> tuple[str, float]:
     """Return the base unit and the factor to it, rad and pi/180 for deg; other units stay."""
-    of, slash, per = unit.rpartition("/")
-    if slash and is_rate(unit):
-        (base, number), (second, time) = (
-            base_of(spelt(each.strip()) or each) for each in (of, per)
-        )
-        return f"{base}/{second}", number / time
+    of, times = _over_time(unit)
+    if times:
+        base, number = base_of(spelt(of) or of)
+        return base + "/s" * len(times), number / math.prod(UNITS[time].factor for time in times)
     name, number = without_number(unit)
     known = UNITS.get(name)
     if known is None or known.kind == "share":
