@@ -21,8 +21,8 @@ from prior_reinforce.arm.recordings.time_finder import (
     Times,
     are_ticks,
     find_times,
+    is_frame_rate,
     is_periods,
-    is_rate,
     is_throw,
     other_times,
     rises,
@@ -338,11 +338,11 @@ def hold_together(where: str, clocks: Mapping[str, Times]) -> None:
 
 def _doubt_rate(name: str, rate: float, count: int) -> tuple[Ambiguity, ...]:
     """Doubt a declared rate at which no arm is recorded: `dt` 20 is in milliseconds, or a rate."""
-    if is_rate(rate):
+    if is_frame_rate(rate):
         return ()
     in_units = [rate / scale for unit, scale in SECONDS.items() if unit not in ("min", "h")]
     others = [1 / rate, *in_units] if _RATE.fullmatch(name.lower()) else [*in_units, 1 / rate]
-    likely = list(filter(is_rate, others)) or [rate]
+    likely = list(filter(is_frame_rate, others)) or [rate]
     what = f"{name} in the file says {rate:.4g} frames a second, {count / rate:.4g} s in all"
     what += ": it looks like " + " or ".join(f"{other:.4g}" for other in likely)
     return (Ambiguity(what, f"--rate {likely[0]:.6g}"),)
@@ -367,7 +367,8 @@ def _judge(
     if looks == unit or period <= 0:
         return unit, ()
     if said is not None and (
-        is_rate(1 / (period * SECONDS[unit])) or not (looks and is_throw(length * SECONDS[looks]))
+        is_frame_rate(1 / (period * SECONDS[unit]))
+        or not (looks and is_throw(length * SECONDS[looks]))
     ):
         return said, ()  # believed, unless another unit makes it the length of a throw
     as_said = f", as {by}," if said is not None else ""
@@ -389,7 +390,7 @@ def _judge(
         return "s", (Ambiguity(what, "--time-unit frame --rate HZ", guessed=False),)
     if said is None and period == 1:
         what += " (or it counts frames: --time-unit frame --rate HZ)"
-    elif said is None and "tick" in name.lower() and is_rate(1e7 / period):
+    elif said is None and "tick" in name.lower() and is_frame_rate(1e7 / period):
         what = f"{name} steps by {period:g}, and nothing says how long a tick is"
         what += " (.NET's are 100 ns: then write that column in ns, times 100)"
         return "s", (Ambiguity(what, "--time-unit UNIT", guessed=False),)

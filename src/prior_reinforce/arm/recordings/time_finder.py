@@ -154,7 +154,7 @@ def _refuse_several(where: object, times: Sequence[tuple[str, Stamps]]) -> None:
             )
 
 
-def is_rate(hertz: float) -> bool:
+def is_frame_rate(hertz: float) -> bool:
     """Whether an arm may be recorded at so many frames a second."""
     return _SLOWEST <= hertz <= _FASTEST
 
