@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import prior_reinforce as pr
-from prior_reinforce.arm.workspace.declared import read_object
+from prior_reinforce.arm.workspace.declared import DeclaredSymmetry, read_object
 from prior_reinforce.arm.workspace.reaching import region_of
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.errors import (
@@ -17,7 +17,7 @@ from prior_reinforce.errors import (
 from prior_reinforce.plans.kinematics import rotation
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.plan_format import PlanFormat
-from prior_reinforce.plans.symmetry import Shift, TurnJoint, TurnPath
+from prior_reinforce.plans.symmetry import Amplitude, Shift, TurnJoint, TurnPath
 
 BOX = (-0.8, -0.9, 0.4, 0.6, 0.9, 1.4)
 
@@ -134,6 +134,15 @@ def test_poses_without_a_robot_are_shifted(tmp_path):
         workspace.set_goal([0.6, 0.0])
         plan = workspace.session().ask().plan
         np.testing.assert_allclose(plan, np.add(path, [0.1, -0.1, 0.0]), atol=1e-9)
+
+
+def test_what_a_turn_leaves_is_named_in_the_manifest():
+    form = PlanFormat(("x", "y", "z", "pitch"), ("m",) * 3 + ("rad",), 0.02)
+    outcomes = pr.OutcomeFormat(("x", "y"), ("m", "m"), (0.05, 0.05))
+    with pytest.raises(ConfigurationError, match=r"stays = \['pitch'\]"):
+        DeclaredSymmetry("carried").symmetry(form, outcomes, None)
+    made = DeclaredSymmetry("carried", "amplitude", stays=("pitch",))
+    assert made.symmetry(form, outcomes, None).moves[0] == Amplitude()
 
 
 def test_what_is_no_answer_is_refused():

@@ -109,9 +109,20 @@ def test_what_a_turn_would_leave_behind_is_refused_until_it_is_named(names, left
     with pytest.raises(ConfigurationError, match=f"a turn would leave {left} as recorded"):
         declare_symmetry(form, 2, about=(0.0, 0.0))
     unmoved = left.split(", ")
+    assert declare_symmetry(form, 2, about=(0.0, 0.0), stays=unmoved).moves[0].steps == ()
     assert declare_symmetry(form, 2, about=(0.0, 0.0), steps=unmoved).moves[0].steps == tuple(
         names.index(name) for name in unmoved
     )
+
+
+def test_what_a_turn_leaves_is_made_larger_all_the_same():
+    form = PlanFormat(("x", "y", "z", "pitch"), ("m",) * 3 + ("rad",), 0.02)
+    symmetry = declare_symmetry(
+        form, 2, about="base", distance="amplitude", exponent=1.0, stays=["pitch"]
+    )
+    plan = np.array([[0.3, 0.0, 0.1, 0.0], [0.4, 0.0, 0.3, 0.2]])
+    moved = symmetry.move(plan, np.array([np.log(2.0), 0.5]))
+    np.testing.assert_allclose(moved[:, 2:], [[0.1, 0.0], [0.5, 0.4]])
 
 
 def test_a_shift_knows_every_place():
@@ -137,7 +148,7 @@ def test_a_shift_knows_places_by_name_where_units_were_guessed(names, left):
     form = PlanFormat(names, ("m", "m", *("rad",) * (len(names) - 2)), 0.04)
     with pytest.raises(ConfigurationError, match=f"a shift would leave {left} as recorded"):
         declare_symmetry(form, 2, distance="shift")
-    declare_symmetry(form, 2, distance="shift", steps=left.split(", "))
+    declare_symmetry(form, 2, distance="shift", stays=left.split(", "))
 
 
 @pytest.mark.parametrize("names", ["quat_w quat_x quat_y quat_z", "rot_x rot_y", "rx ry rz", "vx"])
@@ -157,7 +168,7 @@ def test_what_moves_beside_an_arm_is_refused_until_it_is_named(about):
     said = {"about": about, "chain": PANDA, "joints": range(4, 11)}
     with pytest.raises(ConfigurationError, match=f"would leave {', '.join(left)} as recorded"):
         declare_symmetry(form, 2, **said)
-    assert declare_symmetry(form, 2, steps=left, **said).moves[0].steps == (11, 12, 13)
+    assert declare_symmetry(form, 2, stays=left, **said).moves[0].steps == ()
 
 
 @pytest.mark.parametrize("about", ["base", (0.43, 0.0)])
@@ -234,6 +245,7 @@ def test_neither_leaves_a_scaling_of_one_outcome():
         (JOINTS, 2, {"distance": "shift"}, "needs plans with x and y"),
         (JOINTS, 3, {"about": "base", **ARM}, "outcomes have 3 components"),
         (JOINTS, 1, {"steps": ["hand"]}, r"steps names \['hand'\]"),
+        (JOINTS, 1, {"stays": ["hand"]}, r"stays names \['hand'\]"),
     ],
 )
 def test_what_cannot_be_done_is_refused_by_name(form, k, said, message):

@@ -32,6 +32,8 @@ class DeclaredSymmetry(Struct, frozen=True, forbid_unknown_fields=True):
     """Where a clock lets go, and not the motion."""
     steps: tuple[str, ...] = ()
     """Columns of grippers and triggers."""
+    stays: tuple[str, ...] = ()
+    """Columns that a turn or a shift leaves as they are."""
     start: tuple[float, float] = (0.0, 0.0)
     """(x, y) of the hand before plans of increments."""
     no_box: bool = False
@@ -75,6 +77,7 @@ class DeclaredSymmetry(Struct, frozen=True, forbid_unknown_fields=True):
             start=self.start,
             release_frame=self.release_frame,
             steps=self.steps,
+            stays=self.stays,
         )
         symmetry.check_units(outcomes.units, form.units)
         return symmetry

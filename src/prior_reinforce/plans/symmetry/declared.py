@@ -70,6 +70,7 @@ def declare_symmetry(
     start: tuple[float, float] = (0.0, 0.0),
     release_frame: float | None = None,
     steps: Sequence[str] = (),
+    stays: Sequence[str] = (),
     exponent: float = NOMINAL_EXPONENT,
 ) -> Symmetry:
     """Make the symmetry of a task from what is said of it.
@@ -85,7 +86,9 @@ def declare_symmetry(
         ranges: Their ends, [rad]; turned plans go the other way round where that fits alone.
         start: (x, y) of the hand before increments, [m].
         release_frame: Where a clock lets go, and not the motion.
-        steps: Names of grippers, triggers, and what else a turn leaves as it is.
+        steps: Names of grippers and triggers: neither turned nor made larger, and played along
+            lines.
+        stays: Names of what a turn or a shift leaves as it is, but tempo and amplitude scale.
         exponent: p of distance ~ speed^p: 1 for a level throw from a height, whose fall takes the
             same time at any speed; 2 for a throw upwards and a slide; less by the share of the
             distance that the object is carried.
@@ -94,13 +97,17 @@ def declare_symmetry(
         ConfigurationError: Plans or outcomes are not such that this can be done.
     """
     column = {name: index for index, name in enumerate(form.names)}
-    if unknown := sorted(set(steps) - set(column)):
-        raise ConfigurationError(f"steps names {unknown}, but plans have {', '.join(form.names)}")
+    for key, said in (("steps", steps), ("stays", stays)):
+        if unknown := sorted(set(said) - set(column)):
+            raise ConfigurationError(
+                f"{key} names {unknown}, but plans have {', '.join(form.names)}"
+            )
     if release_frame is not None and distance != "tempo":
         raise ConfigurationError(
             f"release_frame says about which frame tempo plays a motion; distance is {distance!r}"
         )
     _refuse_unplayable(form, distance, steps)
+    left = (*steps, *stays)
     increments = tuple(sorted({*form.increments, *form.rates}))
     if distance == "shift":
         place = _columns(column, ("x", "y")) or _columns(column, ("dx", "dy"))
@@ -111,7 +118,7 @@ def declare_symmetry(
             )
         _refuse_rates(form, place, form.rates)
         known = (*place, *form.rates, *_named(column, ("z", "dx", "dy", "dz")))
-        _refuse_left_behind(form, "shift", known, steps, _places(form))
+        _refuse_left_behind(form, "shift", known, left, _places(form))
         return shift((place[0], place[1]), _LEAD if place[0] in increments else 0)
     stepped = tuple(column[name] for name in steps)
     scale: AnyMove = Amplitude(exponent, stepped, increments)
@@ -146,7 +153,7 @@ def declare_symmetry(
     centre = _centre(about)
     if chain is not None and joints:
         _refuse_rates(form, joints, increments)
-        _refuse_left_behind(form, "turn", joints, steps)
+        _refuse_left_behind(form, "turn", joints, left)
         if about != "base" and not _on_first_axis(chain, centre):
             path = TurnPath(chain, centre, tuple(joints), tuple(ranges) or UNSET)
             return turn_and_scale(path, centre, scale, others)
@@ -166,7 +173,7 @@ def declare_symmetry(
         known = (*place, *vector, *quaternion, *_named(column, ("z", "yaw")))
         known += _columns(column, ("roll", "pitch", "yaw"))
         _refuse_rates(form, known, form.rates)
-        _refuse_left_behind(form, "turn", known, steps)
+        _refuse_left_behind(form, "turn", known, left)
         turn: AnyMove = TurnPoses(
             centre, (place[0], place[1]), vector or None, quaternion or None, column.get("yaw")
         )
@@ -174,7 +181,7 @@ def declare_symmetry(
     if place := _columns(column, ("dx", "dy")):
         known = _named(column, ("dx", "dy", "dz", "dyaw"))
         _refuse_rates(form, known, form.rates)
-        _refuse_left_behind(form, "turn", known, steps)
+        _refuse_left_behind(form, "turn", known, left)
         turn = TurnIncrements(start, centre, (place[0], place[1]), column.get("dyaw"), _LEAD)
         return turn_and_scale(turn, centre, scale, others)
     raise ConfigurationError(
@@ -218,7 +225,7 @@ def _refuse_left_behind(
     form: PlanFormat,
     move: str,
     known: Collection[int],
-    steps: Sequence[str],
+    stays: Collection[str],
     among: Iterable[int] | None = None,
 ) -> None:
     """Refuse columns that a move would leave as they are, unless they are openings or are named.
@@ -229,13 +236,13 @@ def _refuse_left_behind(
     left = [
         name
         for name in (form.names[i] for i in every if i not in known)
-        if name not in steps and not _stays(form, name)
+        if name not in stays and not _stays(form, name)
     ]
     if left:
         raise ConfigurationError(
             f"a {move} would leave {', '.join(left)} as recorded: it moves the arm's joints, or x, "
             "y, z, yaw, rx, ry, rz in radians, qw, qx, qy, qz, and increments dx, dy, dz, dyaw; "
-            f"rename columns that are these, and of what is right so say steps = {left}"
+            f"rename columns that are these, and of what is right so say stays = {left}"
         )
 
 
