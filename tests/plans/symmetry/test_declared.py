@@ -100,7 +100,9 @@ def test_increments_are_played_turned_and_shifted_as_such():
         (("dx", "dy", "drx", "dry"), "drx, dry"),
         (("dx", "dy", "dtheta"), "dtheta"),
         (("x", "y", "gripper_yaw"), "gripper_yaw"),
-        (("x", "y", "finger_x", "jaw_angle", "gripper_vx"), "finger_x, jaw_angle, gripper_vx"),
+        (("x", "y", "finger_x", "jaw_angle", "gripper_vx"), "finger_x, gripper_vx"),
+        (("x", "y", "gripper_pose_0", "gripper_rot_1"), "gripper_pose_0, gripper_rot_1"),
+        (("x", "y", "z", "pitch", "roll"), "pitch, roll"),
         (("x", "y", "gripper_qw", "gripper_width"), "gripper_qw"),
     ],
 )
@@ -151,12 +153,37 @@ def test_a_shift_knows_places_by_name_where_units_were_guessed(names, left):
     declare_symmetry(form, 2, distance="shift", stays=left.split(", "))
 
 
-@pytest.mark.parametrize("names", ["quat_w quat_x quat_y quat_z", "rot_x rot_y", "rx ry rz", "vx"])
-def test_a_shift_leaves_attitudes_and_rates(names):
+@pytest.mark.parametrize(
+    ("names", "unit"),
+    [
+        *((names, "rad") for names in ("quat_w quat_x quat_y quat_z", "rot_x rot_y", "rx ry rz")),
+        *((f"{angle}_x {angle}_y {angle}_z", "rad") for angle in ("euler", "axis_angle", "angle")),
+        ("vx", "m/s"),
+        ("force_x force_y", "N"),
+        ("torque_x", "Nm"),
+    ],
+)
+def test_a_shift_leaves_attitudes_rates_and_forces(names, unit):
     names = names.split()
-    units = ("m/s",) if names == ["vx"] else ("rad",) * len(names)
-    form = PlanFormat(("x", "y", *names), ("m", "m", *units), 0.04)
+    form = PlanFormat(("x", "y", *names), ("m", "m", *(unit,) * len(names)), 0.04)
     assert declare_symmetry(form, 2, distance="shift").moves == (Shift(0), Shift(1))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("gripper_angle", "finger_angle", "jaw_angle", "gripper_rotation", "gripper_pose", "hand"),
+        *("right_hand", "drive_joint", "magnet", "trigger", "pump", "valve", "tool_do", "finger_1"),
+    ],
+)
+def test_openings_are_right_in_any_place(name):
+    form = PlanFormat((name, *JOINTS.names[1:]), ("rad",) * 8, 0.01)
+    assert kinds(declare_symmetry(form, 2, about="base", **ARM)) == [Tempo, TurnJoint]
+
+
+def test_about_the_vertical_only_yaw_turns():
+    form = PlanFormat(("x", "y", "z", "pitch", "yaw"), ("m",) * 3 + ("rad",) * 2, 0.01)
+    assert declare_symmetry(form, 2, about="base").moves[1] == TurnPoses(yaw=4)
 
 
 @pytest.mark.parametrize("about", ["base", (0.43, 0.0)])
@@ -238,6 +265,7 @@ def test_neither_leaves_a_scaling_of_one_outcome():
     [
         (JOINTS, 2, {}, "needs an axis"),
         (JOINTS, 2, {"about": "base"}, r"name the arm .*chain=robot_limits\('ur5e'\).chain"),
+        (PlanFormat(("delta_x",), ("m",), 0.1), 2, {"about": "base"}, "increments dx and dy"),
         (JOINTS, 2, {"about": "carried", **ARM}, r"'base' .*\(x, y\).*None.*got 'carried'"),
         (JOINTS, 2, {"about": (0.4, 0.0, 0.1), **ARM}, r"'base' .*\(x, y\)"),
         (JOINTS, 2, {"about": ("a", "b"), **ARM}, r"'base' .*\(x, y\)"),

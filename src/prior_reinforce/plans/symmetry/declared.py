@@ -38,19 +38,25 @@ from prior_reinforce.plans.symmetry.moves import (
 )
 from prior_reinforce.plans.symmetry.symmetry import Symmetry, scale_alone, shift, turn_and_scale
 from prior_reinforce.plans.whole_turns import attitudes, euler_angles
-from prior_reinforce.units import is_force, kind_of, per_time
+from prior_reinforce.units import is_force, kind_of, per_time, rates
 
 About = Literal["base"] | tuple[float, float] | None
 Distance = Literal["tempo", "amplitude", "learned", "shift"]
 _VECTOR, _QUATERNION = ("rx", "ry", "rz"), ("qw", "qx", "qy", "qz")
-_TOOL = re.compile(OF_A_TOOL, re.IGNORECASE)
-_COORDINATE = re.compile(r"(?<!\b[qr] )\bd?[xyz]( \d+)?$")
-_OF_ATTITUDE = r"quat|orient|\brot|attitude"
-_POSE = re.compile(
-    rf"\b([dvr]?[xyz]|q[wxyz])\b|{_OF_ATTITUDE}|\bpose\b"
-    r"|\bd?(roll|pitch|yaw|heading|bearing|azimuth|theta|phi|psi|angle)\b"
+_TOOL = re.compile(
+    rf"{OF_A_TOOL}|magnet|trigger|pump|drive_joint|tool_d[io](?![a-z])|(?<![a-z])hand(_?\d+)?$",
+    re.IGNORECASE,
 )
-"""What a coordinate of a place, and anything of a pose, is called, in `words`."""
+"""What is of a tool beside an arm or a hand: `drive_joint` is the xArm's gripper."""
+_COORDINATE = re.compile(r"(?<!\b[qr] )\bd?[xyz]( \d+)?$")
+_ATTITUDE = r"quat|orient|attitude|euler|axis angle"
+_IN_SPACE = (
+    rf"\b([dvr]?[xyz]|q[wxyz])\b|{_ATTITUDE}|\b(rot\w*|pose) (\w+ )*\d"
+    r"|\bd?(roll|pitch|yaw|heading|bearing|azimuth|theta|phi|psi)\b"
+)
+"""What a coordinate or an attitude is called, in `words`; a tool's one angle is its opening."""
+_POSE = rf"{_IN_SPACE}|\brot|\bpose\b|\bd?angle\b"
+"""What anything of a pose is called that is no tool's."""
 _ON_AXIS = 1e-3
 """How far from the first joint's axis a place may be and be on it, [m]. Ours: half a turn about the
 one or the other then differs by 2 mm."""
@@ -108,7 +114,8 @@ def declare_symmetry(
         )
     _refuse_unplayable(form, distance, steps)
     left = (*steps, *stays)
-    increments = tuple(sorted({*form.increments, *form.rates}))
+    speeds = rates(form.units)
+    increments = tuple(sorted({*form.increments, *speeds}))
     if distance == "shift":
         place = _columns(column, ("x", "y")) or _columns(column, ("dx", "dy"))
         if len(place) != 2 or k != 2:
@@ -116,8 +123,8 @@ def declare_symmetry(
                 "distance 'shift' needs plans with x and y (or dx and dy) and outcomes x and y; "
                 f"plans have {', '.join(form.names)}, outcomes {k} components"
             )
-        _refuse_rates(form, place, form.rates)
-        known = (*place, *form.rates, *_named(column, ("z", "dx", "dy", "dz")))
+        _refuse_rates(form, place, speeds)
+        known = (*place, *speeds, *_named(column, ("z", "dx", "dy", "dz")))
         _refuse_left_behind(form, "shift", known, left, _places(form))
         return shift((place[0], place[1]), _LEAD if place[0] in increments else 0)
     stepped = tuple(column[name] for name in steps)
@@ -171,8 +178,9 @@ def declare_symmetry(
                     "one of these, or take [symmetry] out"
                 )
         known = (*place, *vector, *quaternion, *_named(column, ("z", "yaw")))
-        known += _columns(column, ("roll", "pitch", "yaw"))
-        _refuse_rates(form, known, form.rates)
+        if "yaw" in column:  # about the vertical, no other of these angles changes
+            known += _named(column, ("roll", "pitch"))
+        _refuse_rates(form, known, speeds)
         _refuse_left_behind(form, "turn", known, left)
         turn: AnyMove = TurnPoses(
             centre, (place[0], place[1]), vector or None, quaternion or None, column.get("yaw")
@@ -180,14 +188,14 @@ def declare_symmetry(
         return turn_and_scale(turn, centre, scale, others)
     if place := _columns(column, ("dx", "dy")):
         known = _named(column, ("dx", "dy", "dz", "dyaw"))
-        _refuse_rates(form, known, form.rates)
+        _refuse_rates(form, known, speeds)
         _refuse_left_behind(form, "turn", known, left)
         turn = TurnIncrements(start, centre, (place[0], place[1]), column.get("dyaw"), _LEAD)
         return turn_and_scale(turn, centre, scale, others)
     raise ConfigurationError(
         f"plans of {', '.join(form.names)} cannot be turned: name the arm ([robot]; in Python "
         "chain=robot_limits('ur5e').chain, or arm.robots.urdf.read_urdf(path).chain, and the "
-        "columns of its joints, joints=range(6)), or give poses x and y"
+        "columns of its joints, joints=range(6)), or give poses x and y, or increments dx and dy"
     )
 
 
@@ -248,15 +256,17 @@ def _refuse_left_behind(
 
 def _stays(form: PlanFormat, name: str) -> bool:
     """Whether a column is a tool's opening, or one number a plan, and so is right in any place."""
-    tool = name in form.per_plan or _TOOL.search(name) is not None
-    return tool and _POSE.search(words(name)) is None
+    if _TOOL.search(name):
+        return re.search(_IN_SPACE, words(name)) is None
+    return name in form.per_plan and re.search(_POSE, words(name)) is None
 
 
 def _places(form: PlanFormat) -> list[int]:
     """Columns of a length, or whose name says a coordinate, as units may have been guessed."""
     turned = {name for group in (*form.attitudes, *attitudes(form.names)) for name in group}
     turned |= {name for group in euler_angles(form.names, form.units) for name in group}
-    turned |= {name for name in form.names if re.search(_OF_ATTITUDE, words(name))}
+    turned |= {name for name in form.names if re.search(rf"{_ATTITUDE}|\brot|\bangle", words(name))}
+    turned |= {n for n, unit in zip(form.names, form.units, strict=True) if is_force(unit)}
     return [
         i
         for i, (name, unit) in enumerate(zip(form.names, form.units, strict=True))
