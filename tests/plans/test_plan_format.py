@@ -30,7 +30,7 @@ def test_a_text_is_no_list_of_names():
 
 
 def test_increments_are_told_by_name_and_a_rate_is_none():
-    names = ("dx", "dyaw", "drx", "delta_joint1", "x", "joint1", "dy", "d_joint2", "DZ")
+    names = ("dx", "dyaw", "drx", "delta_joint1", "u", "joint1", "dy", "d_joint2", "DZ")
     units = ("m", "rad", "rad", "rad", "m", "rad", "m/s", "rad/s", "m")
     form = PlanFormat(names, units, 0.02)
     assert [names[i] for i in form.increments] == ["dx", "dyaw", "drx", "delta_joint1", "DZ"]
@@ -41,7 +41,7 @@ def test_increments_are_told_by_name_and_a_rate_is_none():
     [
         *("left_dx", "ee_dx", "d_x", "delta.x", "delta x", "action.delta_x", "action/delta_x"),
         *("deltaX", "dX", "x_delta", "joint1_delta", "dpos_x", "dgripper", "gripper_delta"),
-        *("rel_x", "increment_0", "Δx", "∆x", "d_joint1", "world_vector_0", "gripper_dyaw"),
+        *("increment_0", "Δx", "∆x", "d_joint1", "world_vector_0", "gripper_dyaw"),
     ],
 )
 def test_increments_have_many_names(name):
@@ -50,7 +50,11 @@ def test_increments_have_many_names(name):
 
 
 @pytest.mark.parametrize(
-    "name", ["dq1", "vx", "dt", "d1", "d_3", "id", "grid_x", "width", "dist", "q_d_1", "index"]
+    "name",
+    [
+        *("dq1", "vx", "dt", "d1", "d_3", "id", "grid_x", "width", "dist", "q_d_1", "index"),
+        *("delta_1", "left_delta3", "rel_x", "joint1_rel", "relative_encoder_1"),
+    ],
 )
 def test_rates_slides_and_other_names_are_no_increments(name):
     assert PlanFormat((name,), ("rad",), 0.02).increments == ()
@@ -61,9 +65,12 @@ def test_rates_beside_their_joints_as_plans_are_exported_are_no_increments():
     assert PlanFormat(names, ("rad",) * 4, 0.02).increments == (3,)
 
 
-def test_rates_are_told_by_any_unit_per_time():
-    form = PlanFormat(tuple("abcde"), ("rad", "m/sec", "rpm", "m/s^2", "rad s^-1"), 0.02)
-    assert form.rates == (1, 2, 4)
+@pytest.mark.parametrize(
+    "names", ["theta1 theta2 dtheta1 dtheta2", "x y theta dx dy dtheta", "X Y DX dY"]
+)
+def test_velocities_of_a_state_are_no_increments(names):
+    names = names.split()
+    assert PlanFormat(tuple(names), ("rad",) * len(names), 0.02).increments == ()
 
 
 def test_increments_are_summed_from_0_and_taken_apart_again():

@@ -17,9 +17,10 @@ from prior_reinforce.units import per_time
 
 _INCREMENT = re.compile(
     r"\b(d(r?[xyz]|roll|pitch|yaw|theta|phi|psi|heading|angle|pos|rot|joint|grip(per)?)"
-    r"|delta|incr?|increments?|rel|relative|world vector)\b|^d (?!\d)"
+    r"|delta(?! \d+$)|incr?|increments?|world vector)\b|^d (?!\d)"
 )
-"""What an increment is called, in `words`; `world_vector` is that of RT-1 (Open X-Embodiment)."""
+"""What an increment is called, in `words`; `world_vector` is that of RT-1 (Open X-Embodiment), and
+`delta_1` a joint of a delta robot."""
 OF_A_TOOL = (
     r"grip|jaw|finger|width|claw|opening|suction|robotiq|wsg|greifer|pince|夹爪|夹具|vacuum|valve"
 )
@@ -94,19 +95,15 @@ class PlanFormat:
 
         What counts of them is their sum. Those of a place and a heading are along the table's axes
         (`x` and `y` of outcomes); odometry, along a body's own, must be recorded as poses. A rate,
-        as in m/s, is no increment; nor is `d_joint1` beside `joint1`, which are rates in exports.
+        as in m/s, is no increment; nor is `d_joint1` beside `joint1` or `dx` beside `x`, which are
+        rates in exports and states.
         """
-        rates = {f"{derivative}_{name}" for name in self.names for derivative in ("d", "dd")}
+        rates = {each + name.lower() for name in self.names for each in ("d", "d_", "dd_")}
         return tuple(
             i
             for i, (name, unit) in enumerate(zip(self.names, self.units, strict=True))
-            if _INCREMENT.search(words(name)) and name not in rates and not per_time(unit)
+            if _INCREMENT.search(words(name)) and name.lower() not in rates and not per_time(unit)
         )
-
-    @property
-    def rates(self) -> tuple[int, ...]:
-        """Columns whose unit is one per time: m/s, rad/sec, rpm."""
-        return tuple(i for i, unit in enumerate(self.units) if per_time(unit) == 1)
 
     def toward(self, frames: Frames, pose: Point) -> Frames:
         """Return a motion in the turns and signs in which its first frame is nearest to a pose.

@@ -157,7 +157,7 @@ class Symmetry:
 
     @property
     def increments(self) -> tuple[int, ...]:
-        """Columns of a plan that are differences from frame to frame, as its moves say."""
+        """Columns of a plan that are 0 at rest, increments and rates, as its moves say."""
         return tuple(sorted({column for move in self.moves for column in move.increments_of()}))
 
     @property
