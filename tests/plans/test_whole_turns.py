@@ -10,15 +10,28 @@ from prior_reinforce.plans.whole_turns import attitudes, euler_angles, other_for
 
 def test_angles_that_nothing_stops_are_known_by_name_and_unit():
     names = ("yaw", "tool_roll", "scroll", "Gierwinkel", "heading", "joint1", "left_wrist_roll")
-    units = ("rad", "deg", "rad", "deg", "m", "rad", "rad")
+    names += ("wrist_roll.pos", "waist_yaw")
+    units = ("rad", "deg", "rad", "deg", "m", *("rad",) * 4)
     assert whole_circles(names, units) == ("yaw", "tool_roll", "Gierwinkel")
 
 
 def test_joints_of_a_limb_are_no_attitude():
     angles = ("roll", "pitch", "yaw")
-    for of, is_one in (("tool_", True), ("left_shoulder_", False), ("", True), ("waist_", False)):
-        names = [of + angle for angle in angles]
-        assert euler_angles(names, ("rad",) * 3) == ((tuple(names),) if is_one else ())
+    for of in ("left_shoulder_", "waist_", "r_upper_arm_"):
+        assert euler_angles([of + angle for angle in angles], ("rad",) * 3) == ()
+
+
+@pytest.mark.parametrize("of", ["", "tool_", "arm_eef_", "left_arm.tcp.", "xarm_", "wrist_pose_"])
+def test_angles_of_what_an_arm_holds_are_an_attitude(of):
+    names, units = tuple(of + angle for angle in ("roll", "pitch", "yaw")), ("rad",) * 3
+    assert euler_angles(names, units) == (names,)
+    assert whole_circles(names, units) == (names[0], names[2])
+
+
+@pytest.mark.parametrize("of", ["wrist_", "arm_", "left_arm."])
+def test_rx_ry_rz_are_an_attitude_of_any_limb(of):
+    names = tuple(f"{of}r{axis}" for axis in "xyz")
+    assert euler_angles(names, ("deg",) * 3) == (names,)
 
 
 @pytest.mark.parametrize(

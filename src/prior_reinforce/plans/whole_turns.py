@@ -22,10 +22,12 @@ one frame."""
 CIRCLES = r"yaw|roll|heading|azimuth?|bearing|gier(winkel)?|roll(winkel)?"
 """Names of angles that nothing stops."""
 _OF_A_LIMB = re.compile(
-    r"shoulder|elbow|arm[^a-z]|wrist|waist|torso|hip[^a-z]|neck|ankle|knee|schulter|hand_?gelenk",
+    r"(shoulder|elbow|(fore|upper_?)arm|wrist|waist|torso|hip|neck|ankle|knee|schulter"
+    r"|hand_?gelenk)[^a-z]*(roll|pitch|yaw|rotate)",
     re.IGNORECASE,
 )
-"""Limbs, of which `_roll`, `_pitch` and `_yaw` are joints with stops, and no Euler angles."""
+"""Joints of limbs, which have stops and are no Euler angles; `wrist_tcp_roll` and `arm_roll`, of
+what an arm holds, are."""
 _WHOLE_CIRCLE = re.compile(rf"(^|[^a-z])({CIRCLES})($|[^a-z])", re.IGNORECASE)
 _QUATERNION = re.compile(r"(?P<stem>.*?)(?P<part>(?<![a-z])q[._]?[xyzw]|[._ /]?[xyzw])", re.I)
 _OF_ATTITUDE = re.compile(r"quat|orient|rot|attitude|(^|[^a-z])q$", re.IGNORECASE)
@@ -90,8 +92,8 @@ def euler_angles(names: Sequence[str], units: Sequence[str]) -> tuple[tuple[str,
         groups: dict[str, dict[str, str]] = {}
         for name, unit in zip(names, units, strict=True):
             word = _last_word(name)
-            of_a_limb = word is not None and is_of_a_limb(word[0])
-            if unit in TURN and word is not None and word[1] in letters and not of_a_limb:
+            of_angle = unit in TURN and not is_of_a_limb(name)
+            if of_angle and word is not None and word[1] in letters:
                 groups.setdefault(word[0], {})[word[1]] = name
         for group in groups.values():
             if len(group) == 3:

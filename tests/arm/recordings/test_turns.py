@@ -176,6 +176,16 @@ def test_a_gripper_beside_increments_is_no_part_of_a_quaternion():
     assert said == ""
 
 
+def test_a_numbered_joint_of_a_limb_starts_in_one_turn():
+    starts = (2.5, -3.1, 2.6, 3.0)
+    own = [(start + 0.2 * S)[:, None] for start in starts]
+    read, said = brought_together(("wrist_3_joint",), "rad", own)
+    np.testing.assert_allclose(
+        [np.deg2rad(m[0, 0]) for m in read], [2.5, 3.183, 2.6, 3.0], atol=1e-3
+    )
+    assert "taken 1 turn higher" in said
+
+
 def test_a_wrist_that_counts_a_turn_a_throw_is_brought_to_one_turn():
     spins = [(0.1 + 0.5 * T + 2 * np.pi * k)[:, None] for k in (0, 1, 1, 1, 1, 5)]
     read, said = brought_together(("joint1",), "rad", spins)
