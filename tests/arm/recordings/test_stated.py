@@ -137,20 +137,35 @@ def test_an_only_array_that_is_called_an_outcome_is_named_as_what_may_be_the_mot
         motion_keys("a.npz", ReadOptions(), {"landing_q": Q}, ("q",))
 
 
+def read_beside(motion, said, options=None):
+    arrays = {"q": motion, "t": np.arange(len(motion)) / 50}
+    options = options or ReadOptions()
+    return recorded_among(
+        Path("a.npz"), "0", ("q",), arrays, options, texts={}, stated=said, names=UR
+    )
+
+
 def test_a_motion_far_from_its_own_statistics_is_normalised():
     motion = Q + np.array([2.0, -2.0, 1.0])
     mean, std = motion.mean(axis=0), motion.std(axis=0)
     normalised = (motion - mean) / std
-
-    def read(motion, options, **said):
-        arrays = {"q": motion, "t": np.arange(len(motion)) / 50}
-        return recorded_among(
-            Path("a.npz"), "0", ("q",), arrays, options, texts={}, stated=said, names=UR
-        )
-
     ends = {"q_min": motion.min(axis=0), "q_max": motion.max(axis=0)}
-    for said in ({"mean": mean, "std": std}, ends):
-        read(motion, ReadOptions(), **said)
+    for said in ({"mean": mean, "std": std}, ends, {"stats/q.mean": mean, "stats/q.std": std}):
+        read_beside(motion, said)
         with pytest.raises(FileFormatError, match="before it was normalised"):
-            read(normalised, ReadOptions(), **said)
-        read(normalised, ReadOptions(units=["rad"]), **said)
+            read_beside(normalised, said)
+        read_beside(normalised, said, ReadOptions(units=["rad"]))
+
+
+@pytest.mark.parametrize(
+    "names",
+    ["action_min action_max", "tau_min tau_max", "dq_mean dq_std", "q_delta_mean q_delta_std"],
+)
+def test_statistics_of_other_columns_say_nothing_of_the_motion(names):
+    low, high = names.split()
+    said = {low: np.full(3, -0.1), high: np.full(3, 0.1)}
+    np.testing.assert_array_equal(read_beside(Q + 2.0, said).positions, Q + 2.0)
+
+
+def test_bounds_of_what_a_controller_takes_are_none_of_the_motion():
+    read_beside(Q + 2.0, {"min": -np.ones(3), "max": np.ones(3)})

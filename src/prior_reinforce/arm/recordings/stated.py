@@ -57,6 +57,8 @@ if that is more. Ours: sound has more."""
 _FAR_OFF, _SLACK = 5.0, 0.01
 """Standard deviations by which the middle of a motion is off what is said of its mean, and rounding
 of what is said. Ours: a motion is one of those of which it is said."""
+_STEMS = re.compile("[/.]")
+"""What parts an array's own name from where it is: `observations/q`, `stats.q_mean`."""
 _MOST_SAID = 1_000_000
 """Bytes of a JSON beside a table at most. Ours: it says what the columns are."""
 
@@ -145,7 +147,7 @@ def recorded_among(
     )
     positions, known = _joined(where, keys, arrays, texts, options.joints)
     if options.units is None:
-        _refuse_normalised(f"{where}: {episode}", positions, {**stated, **arrays})
+        _refuse_normalised(f"{where}: {episode}", positions, {**stated, **arrays}, keys)
     bare, units = without_units(names or known)
     if not bare and len(positions) > 1:
         refuse_exchanged(episode, positions)
@@ -162,20 +164,29 @@ def recorded_among(
     return recorded(episode, clock, positions, bare, units=units, **more)
 
 
-def _refuse_normalised(where: str, positions: np.ndarray, stated: Mapping[str, Any]) -> None:
-    """FileFormatError if the motion is far from what the file says of its mean or its range."""
+def _refuse_normalised(
+    where: str, positions: np.ndarray, stated: Mapping[str, Any], keys: Sequence[str]
+) -> None:
+    """FileFormatError if the motion is far from what the file says of its mean or its range.
+
+    `mean` and `q_mean` are of a motion `q`; `dq_mean` is of others.
+    """
+    own = {"", *(_STEMS.split(key.lower())[-1] for key in keys)}
     for words in (("mean", "std"), ("min", "max")):
         said = [
             np.ravel(numbers)
             for word in words
             for name, numbers in stated.items()
-            if re.search(rf"(^|[^a-z]){word}$", name.lower())
+            if (stem := re.fullmatch(rf"(|.*[^a-z]){word}", name.lower()))
+            and _STEMS.split(stem[1].rstrip("/._ "))[-1] in own
             and np.size(numbers) == positions.shape[1]
             and np.asarray(numbers).dtype.kind in "fiu"
         ]
         if len(said) != len(words):
             continue  # none, or of several arrays
         one, two = said
+        if words[0] == "min" and np.all(one == -1) and np.all(two == 1):
+            continue  # of what a controller takes, whatever is recorded
         low, high = (one - _FAR_OFF * two, one + _FAR_OFF * two) if words[0] == "mean" else said
         middle = np.nanmedian(positions, axis=0)
         if np.any((middle < low - _SLACK) | (middle > high + _SLACK)):
