@@ -369,3 +369,10 @@ def test_chunks_of_actions_are_no_episodes(tmp_path):
     np.savez(tmp_path / "throw_0.npz", actions=q[ahead], t=t)
     with pytest.raises(FileFormatError, match=r"chunks of 8 actions.*actions\[:, 0\]"):
         read_recordings(tmp_path)
+
+
+def test_episodes_that_rest_at_one_pose_first_are_no_chunks(tmp_path):
+    ends = np.linspace(0.5, 1.0, 60)[:, None, None]
+    q = ends * np.interp(np.arange(50), [5, 40], [0, 1])[:, None] * np.ones(7)
+    np.savez(tmp_path / "all.npz", q=q, t=0.02 * np.arange(50))
+    assert len(read_recordings(tmp_path / "all.npz")) == 60

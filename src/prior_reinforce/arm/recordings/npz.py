@@ -79,7 +79,8 @@ def _episodes(path: Path, arrays: Arrays, name: str, options: ReadOptions) -> Ep
     outcomes = next((arrays[name] for name in _OUTCOME_KEYS if name in arrays), None)
     episodes, several = [name], motions.ndim == 3
     chunks = several and len(motions) > motions.shape[1] > 1
-    if chunks and np.array_equal(motions[1:, 0], motions[:-1, 1]):  # a frame later, the next action
+    # A frame later, all actions but the last are the next ones.
+    if chunks and np.array_equal(motions[1:, :-1], motions[:-1, 1:]):
         raise FileFormatError(
             f"{path}: {keys[0]} of shape {motions.shape} looks like chunks of {motions.shape[1]} "
             f"actions a frame: write the first of each, {keys[0]}[:, 0], or name another by --key"
