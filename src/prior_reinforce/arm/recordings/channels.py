@@ -62,9 +62,10 @@ _WITHIN = (
 )
 """Words of angles: that outweigh a gripper's, that stand alone, or within others (`Handgelenk`)."""
 _TOOL = rf"{OF_A_TOOL}|pressure|force|torque|voltage|temperature"
-_SLIDE = (
-    r"[de]\d|ext(ernal)?([_ ]?axis)?[_ ]?\d*|rail|track|linear|slider?|gantry|prismatic|carriage"
-)
+_RAIL = r"rail|track|linear|slider?|gantry|prismatic|carriage"
+_SLIDE = rf"[de]\d|ext(ernal)?([_ ]?axis)?[_ ]?\d*|{_RAIL}"
+_ALONG = rf"[xyz]|{_RAIL}|belt|conveyor|(tcp|eef?)(?!.*[3-5]\]?$)"
+"""What goes at m/s; of six numbered speeds of a tool, `actual_TCP_speed_0` (UR), the last turn."""
 
 
 def _word(words: str) -> str:
@@ -75,7 +76,7 @@ def _word(words: str) -> str:
 _RATE = r"([._ ]?(vel(ocit(y|ies))?|speeds?)[_.\[ ]*\d*\]?)"
 _BY_NAME = (
     (re.compile(r"(^|.*[^a-z])(d_?|delta[_. ]?)[xyz]|.*torso_?lift.*", re.IGNORECASE), Kind.LENGTH),
-    (re.compile(rf"(^|.*[^a-z])(v[xyz]|[xyz]{_RATE})", re.IGNORECASE), Kind.VELOCITY),
+    (re.compile(rf"(^|.*[^a-z])(v[xyz]|({_ALONG}){_RATE})", re.IGNORECASE), Kind.VELOCITY),
     (re.compile(rf"(^|.*[^a-z])(w[xyz]|(dq|qd)[_.\[ ]*\d+\]?)|.*{_RATE}", re.I), Kind.TURN_RATE),
     (re.compile(r".*quat(ernion)?[_.\[ ]*\d\]?", re.IGNORECASE), Kind.QUATERNION),
     (re.compile(r".*(rot_?vec|axis_?angle)[_.\[ ]*\d\]?", re.IGNORECASE), Kind.ROTATION),
