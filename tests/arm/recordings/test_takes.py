@@ -180,6 +180,9 @@ def test_what_stands_still_may_stand_anywhere():
     assert said(near) == []
 
 
+SO101 = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
+
+
 @pytest.mark.parametrize(
     ("key", "names", "told"),
     [
@@ -187,6 +190,10 @@ def test_what_stands_still_may_stand_anywhere():
         ("action", ("x", "y", "z"), True),
         ("qpos", ("x", "y", "z"), False),
         ("action", ("dx", "dy", "dz"), False),
+        ("action", tuple(f"action.{motor}.pos" for motor in SO101), False),
+        ("action", tuple(f"action.m{i}.pos" for i in range(6)), False),
+        ("actions", tuple(f"joint{i}" for i in range(7)), False),
+        ("actions", tuple(f"action_{i}" for i in range(7)), True),
     ],
 )
 def test_actions_that_are_0_at_both_ends_may_be_increments(key, names, told):

@@ -310,7 +310,10 @@ def increments_unsaid(
     moving = at_zero & (largest > 0)
     called = any(re.search(r"(^|[^a-z])actions?($|[^a-z])", key) for key in (*keys, *names))
     few = np.count_nonzero(moving) < 2 or np.count_nonzero(~at_zero) > 1
-    if told or few or not called or len(names) not in _OF_INCREMENTS:
+    are = {*kinds(names)}
+    joints = bool(are & {Kind.ANGLE, Kind.SLIDE}) and Kind.PLACE not in are
+    joints |= any(name.endswith(".pos") for name in names)  # as LeRobot calls them
+    if told or few or joints or not called or len(names) not in _OF_INCREMENTS:
         return ()
     new = _OF_INCREMENTS[len(names)]
     units = shlex.join([kind.usual_unit(1.0) for kind in kinds(new)])
