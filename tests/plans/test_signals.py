@@ -10,6 +10,7 @@ from prior_reinforce.plans.signals import (
     noise,
     without_noise,
 )
+from prior_reinforce.units import rates
 from tests.arm.recordings.recorded import sampled
 
 FRAMES = np.arange(90)
@@ -186,7 +187,7 @@ def test_moving_rows_of_a_motion_that_returns():
 
 
 def ends(t, q, units):
-    starts, ends = moving_ends(t, q, units, analyse([q], units, t[1] - t[0]))
+    starts, ends = moving_ends(t, q, units, analyse([q], units, t[1] - t[0]), rates(units))
     return starts.tolist(), ends.tolist()
 
 

@@ -41,7 +41,7 @@ from prior_reinforce.plans.speeds import (
     motion_span,
     velocity_profiles,
 )
-from prior_reinforce.units import Kind, in_unit, is_rate
+from prior_reinforce.units import Kind, in_unit
 
 ChannelKind = Literal["held", "switch", "step", "smooth"]
 
@@ -272,23 +272,27 @@ def moving_rows(
 
 
 def moving_ends(
-    times: Float[np.ndarray, " T"], motion: Motion, units: Sequence[str], signals: Signals
+    times: Float[np.ndarray, " T"],
+    motion: Motion,
+    units: Sequence[str],
+    signals: Signals,
+    rates: Sequence[int] = (),
 ) -> Bool[np.ndarray, "2 D"]:
     """Return which channels move at the first frames of a recording, and which at the last.
 
-    The speed is the slope of a line through the frames of 40 ms, at least two; of channels whose
-    unit is a rate's, their mean.
+    The speed is the slope of a line through the frames of 40 ms, at least two; of columns that are
+    `rates`, their mean.
     """
-    rates = np.array([is_rate(unit) for unit in units])
+    is_rate = np.isin(np.arange(len(units)), rates)
     count = max(2, int(np.searchsorted(times, times[0] + _END_TIME, side="right")))
-    fastest = np.abs(np.where(rates, motion, np.gradient(motion, times, axis=0))).max(axis=0)
+    fastest = np.abs(np.where(is_rate, motion, np.gradient(motion, times, axis=0))).max(axis=0)
     rest = [in_unit(REST_SPEED, u) or _REST_SHARE * f for u, f in zip(units, fastest, strict=True)]
     moving = []
     for at in (slice(count), slice(-count, None)):
         t = times[at] - times[at].mean()
         total = float(t @ t)
         mean = motion[at].mean(axis=0)
-        speed = np.abs(np.where(rates, mean, t @ (motion[at] - mean) / total))
-        off = np.where(rates, 1 / math.sqrt(len(t)), 1 / math.sqrt(total)) * signals.noise
+        speed = np.abs(np.where(is_rate, mean, t @ (motion[at] - mean) / total))
+        off = np.where(is_rate, 1 / math.sqrt(len(t)), 1 / math.sqrt(total)) * signals.noise
         moving.append(speed > np.maximum(rest, _NOISE_PEAK * off))
-    return np.array(moving) & (~signals.held | rates)
+    return np.array(moving) & (~signals.held | is_rate)

@@ -184,6 +184,25 @@ def test_the_way_of_missing_increments_is_said_to_be_missing(missing, said):
     assert [said in remark for remark in remarks if "way" in remark] == [True] * bool(said)
 
 
+def test_late_frames_are_not_lost():
+    late = np.random.default_rng(0).uniform(-0.3, 0.3, 100)
+    t = (np.arange(100) + late - late[0]) / 20
+    log = recording(t, 0.01 + 0.005 * np.sin(t)[:, None])
+    how = Preprocessing(trim=False)
+    assert not [one for one in preprocess([log], ("m",), how, [0]).remarks if "missing" in one]
+
+
+@pytest.mark.parametrize(
+    ("names", "units"), [(("dx", "vx"), ("m", "m/s")), (("dx", "joint1_vel"), ("m", "1"))]
+)
+def test_speeds_are_0_from_the_frame_after_the_last_by_unit_or_name(names, units):
+    t = np.arange(30) / 50
+    each = np.column_stack([0.01 + 0.002 * np.sin(t * 9), 0.2 + 0.02 * t])
+    logs = [Recording(str(n), t[:n], each[:n], names) for n in (20, 30)]
+    done = preprocess(logs, units, Preprocessing(trim=False), [0])
+    np.testing.assert_allclose(done.plans[0], [*each[:20], *[[0.0, 0.0]] * 10], atol=1e-12)
+
+
 @pytest.mark.parametrize(("names", "push"), [(("dx", "dy"), 0.01), (("vx", "wz"), 0.2)])
 def test_a_push_at_constant_speed_is_no_rest(names, push):
     rest, ramp = np.zeros(12), np.linspace(0, 1, 5)

@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from prior_reinforce.arm.recordings.appending import check_scale
+from prior_reinforce.arm.recordings.channels import zero_at_rest
 from prior_reinforce.arm.recordings.naming import find_channels
 from prior_reinforce.arm.recordings.preprocessing import (
     Preprocessed,
@@ -33,7 +34,7 @@ from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.plans.plan_format import PlanFormat, summed
 from prior_reinforce.plans.speeds import Channels
 from prior_reinforce.plans.symmetry import Symmetry
-from prior_reinforce.units import UNITS, factor, rates
+from prior_reinforce.units import UNITS, factor
 
 _SMOOTH_HZ = 20
 _SMOOTH = f"--smooth {_SMOOTH_HZ}"
@@ -110,7 +111,7 @@ class Inspection:
     def remarks(self) -> tuple[str, ...]:
         """Warnings, the most important first: limits, ends, gaps, ..."""
         left_out = self.selection.left_out
-        moved = (*self.format.increments, *rates(self.format.units))
+        moved = zero_at_rest(self.format.names, self.format.units)
         first = (
             self.copies,
             all_return(summed(self.processed.plans, moved)),
@@ -317,7 +318,7 @@ def inspect(selection: Selection, wanted: Wanted) -> Inspection:
         check_scale(before, selection)
     selection, form = aligned(selection, robot, before)
     how = wanted.preprocessing or Preprocessing()
-    processed = preprocess(selection.recordings, selection.units, how, form.increments)
+    processed = preprocess(selection.recordings, selection.units, how, form.increments, form.names)
     form = replace(form, dt=processed.dt)
     shown = () if before is None else before.plans
     odd = odd_starts([*shown], [*processed.plans], selection.episodes, form.names, form.units)

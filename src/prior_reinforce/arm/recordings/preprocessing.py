@@ -29,7 +29,6 @@ from prior_reinforce.plans.plan_format import stepped, summed
 from prior_reinforce.plans.signals import Signals, analyse, moving_ends, moving_rows
 from prior_reinforce.plans.speeds import Channels, largest_of_unit
 from prior_reinforce.settings import Checked, NonNegative, Positive
-from prior_reinforce.units import rates
 
 _ON_GRID = 0.02
 """A frame within this share of a time step of where it should be is taken as recorded. Ours: at
@@ -110,11 +109,13 @@ def preprocess(
     units: Sequence[str],
     settings: Preprocessing,
     increments: Sequence[int] = (),
+    names: Sequence[str] = (),
 ) -> Preprocessed:
     """Trim and resample N recordings of the same D channels, in `units`, and to one horizon.
 
     Increments are summed up before, and taken between frames after: half as many frames a second
-    have increments twice as large. Channels in a rate's unit, such as m/s, rest at 0.
+    have increments twice as large. Speeds rest at 0, told by their units, or by the plan's `names`,
+    which are the recorded ones if not given.
     InvalidDemonstrationsError if an episode never moves, exceeds the horizon, or leaps.
     """
     durations = [recording.duration for recording in recordings]
@@ -124,16 +125,18 @@ def preprocess(
     dt = settings.dt or _common_dt(recordings)
     recordings = [_held_while_unchanged(recording) for recording in recordings]
     every, units = [r.positions for r in recordings], tuple(units)
+    speeds = zero_at_rest(names or recordings[0].names, units)
+    speeds = [i for i in speeds if i not in increments]
     signals = analyse(every, units, float(np.median([r.period for r in recordings])))
     spans = [(0.0, r.duration) for r in recordings]
     if settings.trim:
-        spans = [_moving_span(r, units, signals, settings.margin) for r in recordings]
+        spans = [_moving_span(r, units, speeds, signals, settings.margin) for r in recordings]
     sampled = [_resample(r, *s, dt, signals) for r, s in zip(recordings, spans, strict=True)]
     pieces, changes = [piece for piece, _ in sampled], None
     if settings.smooth is not None:
         of_plans = analyse(pieces, units, dt)
         smooth = [
-            _smoothed(recording, piece, dt, settings.smooth, units, of_plans)
+            _smoothed(recording, piece, dt, settings.smooth, units, speeds, of_plans)
             for recording, piece in zip(recordings, pieces, strict=True)
         ]
         off = [after - before for before, after in zip(pieces, smooth, strict=True)]
@@ -150,7 +153,7 @@ def preprocess(
                 f"{horizon}; give a horizon of {longest}, or a larger dt (motions are never cut)"
             )
         held = frames < horizon
-        for remark in _remarks(recording, span, units, signals, jumping, held=held):
+        for remark in _remarks(recording, span, units, speeds, signals, jumping, held=held):
             remarks.setdefault(remark, []).append(recording.episode)
     longest_motion = max(end - start for start, end in spans)
     if longest_motion > LONGEST:
@@ -166,7 +169,7 @@ def preprocess(
     rows = horizon + more
     plans = np.stack([np.pad(p, ((0, rows - len(p)), (0, 0)), mode="edge") for p in pieces])
     for plan, piece in zip(plans, pieces, strict=True):
-        plan[len(piece) :, rates(units)] = 0.0
+        plan[len(piece) - more :, speeds] = 0.0
     return Preprocessed(
         stepped(plans, increments) if increments else plans,
         dt,
@@ -188,8 +191,10 @@ def _with_poses(recording: Recording, increments: Sequence[int]) -> Recording:
     t, q, period = recording.times, recording.positions, recording.period
     ways = np.abs(q[:, list(increments)])
     moving = np.any(ways > _LITTLE_WAY * ways.max(axis=0), axis=1)
-    late = np.rint(np.diff(t) / period).astype(int) - 1
-    lost = int(late[moving[1:] | moving[:-1]].clip(0).sum())
+    waits = np.diff(t)
+    jitter = np.median(np.abs(waits - period))  # else late frames count as lost
+    late = np.where(waits > 1.5 * period + jitter, np.rint(waits / period).astype(int) - 1, 0)
+    lost = int(late[moving[1:] | moving[:-1]].sum())
     remark = (
         f"{lost} of {len(t) + lost} frames are missing in mid-motion, and their way with them, as "
         "increments say it frame by frame: leave the recording out (--leave-out), or write the "
@@ -261,6 +266,7 @@ def _remarks(
     recording: Recording,
     span: tuple[float, float],
     units: tuple[str, ...],
+    speeds: Sequence[int],
     signals: Signals,
     jumping: Sequence[str],
     *,
@@ -293,8 +299,7 @@ def _remarks(
     kept = (t >= span[0]) & (t <= span[1])
     if np.count_nonzero(kept) < _FEWEST_FRAMES:
         return
-    starts, ends = moving_ends(t[kept], recording.positions[kept], units, signals)
-    speeds = rates(units)
+    starts, ends = moving_ends(t[kept], recording.positions[kept], units, signals, speeds)
     then = ", then holds its last pose" if held else ""
     for moving, what in ((starts, "starts in motion"), (ends, f"ends in motion{then}")):
         if names := [recording.names[i] for i in np.flatnonzero(moving) if i not in speeds]:
@@ -313,6 +318,7 @@ def _smoothed(
     dt: float,
     frequency: float,
     units: tuple[str, ...],
+    speeds: Sequence[int],
     signals: Signals,
 ) -> Frames:
     """Frames without what is faster than a frequency, but for steps and switches."""
@@ -335,7 +341,7 @@ def _smoothed(
         np.asarray(sosfiltfilt(sections, frames, axis=0, padtype=padding, padlen=pad))
         for padding in ("even", "odd")
     )
-    starts, ends = moving_ends(np.arange(len(frames)) * dt, frames, units, signals)
+    starts, ends = moving_ends(np.arange(len(frames)) * dt, frames, units, signals, speeds)
     smooth = np.where(starts | ends, moving, at_rest)
     return np.where(signals.jumps, frames, smooth)
 
@@ -372,10 +378,14 @@ def _common_dt(recordings: Sequence[Recording]) -> float:
 
 
 def _moving_span(
-    recording: Recording, units: tuple[str, ...], signals: Signals, margin: float
+    recording: Recording,
+    units: tuple[str, ...],
+    speeds: Sequence[int],
+    signals: Signals,
+    margin: float,
 ) -> tuple[float, float]:
     """From when to when a recording is kept, in [s]: its motion and a margin."""
-    t, speeds = recording.times, rates(units)
+    t = recording.times
     rows = moving_rows(recording.positions, signals.trim_band, speeds)
     if rows is None:
         raise InvalidDemonstrationsError(
