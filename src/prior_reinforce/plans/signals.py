@@ -276,7 +276,7 @@ def moving_ends(
     motion: Motion,
     units: Sequence[str],
     signals: Signals,
-    rates: Sequence[int] = (),
+    rates: Sequence[int],
 ) -> Bool[np.ndarray, "2 D"]:
     """Return which channels move at the first frames of a recording, and which at the last.
 

@@ -185,9 +185,9 @@ def _refuse_normalised(
         if len(said) != len(words):
             continue  # none, or of several arrays
         one, two = said
-        if words[0] == "min" and np.all(one == -1) and np.all(two == 1):
-            continue  # of what a controller takes, whatever is recorded
         low, high = (one - _FAR_OFF * two, one + _FAR_OFF * two) if words[0] == "mean" else said
+        if np.all(low == -1) and np.all(high == 1):
+            continue  # of what a controller takes, whatever is recorded
         middle = np.nanmedian(positions, axis=0)
         if np.any((middle < low - _SLACK) | (middle > high + _SLACK)):
             raise FileFormatError(
