@@ -67,7 +67,15 @@ def test_every_library_is_required_or_an_extra_is_named_for_it():
     required = {Requirement(line).name.lower() for line in PROJECT["dependencies"]}
     imported_as = {"pillow": "pil", "typing-extensions": "typing_extensions"}
     required = {imported_as.get(name, name.replace("-", "_")) for name in required}
-    brought = {"prior_reinforce", "gpytorch", "markupsafe", "mpl_toolkits", "pytest", "draccus"}
+    brought = {
+        "prior_reinforce",
+        "gpytorch",
+        "markupsafe",
+        "docstring_parser",
+        "mpl_toolkits",
+        "pytest",
+        "draccus",
+    }
     unnamed = {
         f"{path.relative_to(SOURCE)}: {name}"
         for path in SOURCE.rglob("*.py")
