@@ -39,7 +39,8 @@ def test_the_sequence_of_the_page_ends_in_a_hit(run, tmp_path, monkeypatch):
                 assert workspace.state.executions[number].tracking_max["rad"] < 0.005
             landed = np.array(re.findall(r"(-?[\d.]+) m\b", said), float)
             alone = task.rollout(plan[None], None)[0].outcome
-            assert landed == pytest.approx(alone, abs=0.001)
+            # Paths within 4 mrad let go of the ball a little differently: by up to 1.5 mm.
+            assert landed == pytest.approx(alone, abs=0.002)
             seen = re.search(r"by eye, of --goal: (.*)", said)[1]
             if hit := seen.endswith(", a hit"):
                 assert run("tell", "hoop", number, "--hit")[0] == 0
