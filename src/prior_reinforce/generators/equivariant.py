@@ -88,9 +88,8 @@ class Equivariant(Wrapper):
             at_once(progress, loss=0.0)
             how = "the nearest demonstration is moved to the goal"
             how = how if demonstrations.n > 1 else "the demonstration is moved to the goal"
-        self.remarks = (f"symmetry: {symmetry.name}; {how}",)
-        if declared is None:
-            self.remarks = (_say_found(symmetry, demonstrations.format.names),)
+        said = f"symmetry: {symmetry.name}; {how}"
+        self.remarks = (said if declared else _say_found(symmetry, demonstrations.format.names),)
 
     def _keep(self, symmetry: Symmetry, plans: Plans, outcomes: Points, noise: Points) -> Anchors:
         anchors = Anchors(symmetry, outcomes, noise)

@@ -153,14 +153,10 @@ def kinds(names: Sequence[str]) -> tuple[Kind, ...]:
 
 def zero_at_rest(names: Sequence[str], units: Sequence[str | None]) -> list[int]:
     """Return the columns that are 0 at rest: increments, and speeds by their name or their unit."""
-    speeds = (Kind.VELOCITY, Kind.TURN_RATE)
-    return [
-        i
-        for i, (name, unit, kind) in enumerate(zip(names, units, kinds(names), strict=True))
-        if kind in speeds
-        or is_rate(unit or "")
-        or PlanFormat((name,), (unit or "1",), 1.0).increments
-    ]
+    form = PlanFormat(tuple(names), tuple(unit or "1" for unit in units), 1.0)
+    speeds, increments = (Kind.VELOCITY, Kind.TURN_RATE), form.increments
+    each = enumerate(zip(form.units, kinds(names), strict=True))
+    return [i for i, (u, kind) in each if i in increments or kind in speeds or is_rate(u)]
 
 
 def one_for_all(

@@ -27,7 +27,6 @@ from prior_reinforce.arm.robots.gate import check_plan
 from prior_reinforce.arm.robots.gate_settings import GateSettings
 from prior_reinforce.arm.robots.limits import RobotLimits, joint_of, match_joints
 from prior_reinforce.arm.robots.report import LimitLine, LimitReport
-from prior_reinforce.arrays import Plans
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError, InvalidPlanError
 from prior_reinforce.plans.interpolation import RATE
 from prior_reinforce.plans.motions import Demonstrations, Plan
@@ -121,12 +120,6 @@ class Inspection:
         )
         last = f"left out although it moves: {left_out} ({_TAKE_IT})" if left_out else ""
         return tuple(filter(None, (*first, last, *self.processed.remarks)))
-
-    @property
-    def _poses(self) -> Plans:
-        """The plans, with the poses that increments lead to."""
-        plans, increments = self.processed.plans, self.format.increments
-        return summed(plans, increments) if increments else plans
 
     @property
     def _refusals(self) -> list[list[LimitLine]]:
@@ -254,7 +247,8 @@ class Inspection:
         )
 
     def _motion(self) -> str:
-        names, units, plans = self.selection.names, self.selection.units, self._poses
+        names, units = self.selection.names, self.selection.units
+        plans = summed(self.processed.plans, self.format.increments)  # where increments lead
         ranges = np.ptp(plans, axis=(0, 1))
         most = int(np.argmax(ranges))
         speeds = np.abs(np.diff(plans, axis=1)).max(axis=1) / self.processed.dt

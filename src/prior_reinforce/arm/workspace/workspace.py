@@ -328,11 +328,9 @@ class Workspace:
         from prior_reinforce.arm.recordings import Preprocessing, Wanted
 
         manifest, form = self.manifest, self.manifest.format
-        unknown = form.names == UNKNOWN
-        names = None if unknown else form.names
-        units = (
-            None if unknown and form.units == ("rad",) else form.units
-        )  # rad: `new` was told none
+        names, units = (None, None) if form.names == UNKNOWN else (form.names, form.units)
+        if names is None and form.units != ("rad",):  # which `new` was told
+            units = form.units
         outcome, before = manifest.outcome_format, self.demonstrations if append else None
         how = dataclasses.replace(preprocessing or Preprocessing(), dt=form.dt)
         checks = manifest.robot, manifest.gate, manifest.declared

@@ -19,7 +19,7 @@ from prior_reinforce.plans.symmetry.symmetry import Symmetry, turn_and_scale
 from prior_reinforce.units import kind_of
 
 _FEWEST = 4
-"""Demonstrations that tell a turn from chance."""
+"""Demonstrations that tell a turn from chance. This and what follows: ours."""
 _APART = 0.1
 """Range of the first joint at least, in [rad]."""
 _UNEXPLAINED = 0.2
