@@ -26,7 +26,7 @@ class Kind(Enum):
     QUATERNION = "a part of a quaternion: qx, qy, qz, qw"
     MATRIX = "an entry of a matrix: R11 to R33, rot6d_0"
     PLACE = "a coordinate: x, y, z, tool_x; px, py, pz beside an attitude"
-    LENGTH = "a way, or how far something is out: dx, delta_z, torso_lift_joint"
+    LENGTH = "a displacement, or how far something is extended: dx, delta_z, torso_lift_joint"
     VELOCITY = "how fast something goes: vx, x.vel"
     TURN_RATE = "how fast something turns: dq0, joint1_vel, wz"
     TOOL = "a gripper, or a sensor: a width, a share, a pressure"

@@ -41,7 +41,7 @@ splines leave the range of noise by about as much as there is noise. Ours."""
 _BEGINS = 1e-3
 """Part of the fastest step of its unit above which a channel leaves its rest, noise aside. Ours: a
 plan that begins a little faster leaps from rest, and breaks limits of jerk."""
-_LITTLE_WAY = 0.01
+_SMALL = 0.01
 """Part of the largest increment below which nothing moves. Ours: noise is less."""
 _WHOLE_RATE = 0.005
 """A median period this share from a whole rate is that rate. Ours: clocks drift by less."""
@@ -189,22 +189,22 @@ def preprocess(
 def _with_poses(recording: Recording, increments: Sequence[int]) -> Recording:
     """The recording with poses in place of increments; the last is reached a period later."""
     t, q, period = recording.times, recording.positions, recording.period
-    ways = np.abs(q[:, list(increments)])
-    moving = np.any(ways > _LITTLE_WAY * ways.max(axis=0), axis=1)
+    size = np.abs(q[:, list(increments)])
+    moving = np.any(size > _SMALL * size.max(axis=0), axis=1)
     waits = np.diff(t)
     jitter = np.median(np.abs(waits - period))  # else late frames count as lost
     late = np.where(waits > 1.5 * period + jitter, np.rint(waits / period).astype(int) - 1, 0)
     lost = int(late[moving[1:] | moving[:-1]].sum())
     remark = (
-        f"{lost} of {len(t) + lost} frames are missing in mid-motion, and their way with them, as "
-        "increments say it frame by frame: leave the recording out (--leave-out), or write the "
-        "frames that are missing"
+        f"{lost} of {len(t) + lost} frames are missing in mid-motion, and with them how far it "
+        "went, which increments say frame by frame: leave the recording out (--leave-out), or "
+        "write the frames that are missing"
     )
     return replace(
         recording,
         times=np.append(t, recording.duration + period),
         positions=summed(q, increments),
-        remarks=(*recording.remarks, *[remark][:lost]),
+        remarks=(*recording.remarks, remark) if lost else recording.remarks,
     )
 
 

@@ -275,12 +275,12 @@ def _places(form: PlanFormat) -> list[int]:
 
 
 def _refuse_rates(form: PlanFormat, moved: Iterable[int], rates: Collection[int]) -> None:
-    """Refuse rates among the columns to which a move would add an angle or a way."""
+    """Refuse rates among the columns to which a move would add an angle or a displacement."""
     if wrong := [form.names[i] for i in moved if i in rates]:
         raise ConfigurationError(
-            f"{', '.join(wrong)} are no positions, to which an angle or a way could be added; "
-            "record positions of joints, poses x and y in m, or increments dx and dy in m, or take "
-            "[symmetry] out"
+            f"{', '.join(wrong)} are no positions, to which an angle or a displacement could be "
+            "added; record positions of joints, poses x and y in m, or increments dx and dy in m, "
+            "or take [symmetry] out"
         )
 
 
