@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import chain
@@ -12,25 +11,8 @@ from jaxtyping import Float
 
 from prior_reinforce.arrays import Frames, Point, is_positive
 from prior_reinforce.errors import InvalidPlanError
+from prior_reinforce.plans.channels import increments
 from prior_reinforce.plans.whole_turns import TURN, other_form
-from prior_reinforce.units import per_time
-
-_INCREMENT = re.compile(
-    r"\b(d(r?[xyz]|roll|pitch|yaw|theta|phi|psi|heading|angle|pos|rot|joint|grip(per)?)"
-    r"|delta(?! \d+$)|incr?|increments?|world vector)\b|^d (?!\d)"
-)
-"""What an increment is called, in `words`; `world_vector` is that of RT-1 (Open X-Embodiment), and
-`delta_1` a joint of a delta robot."""
-OF_A_TOOL = (
-    r"grip|jaw|finger|width|claw|opening|suction|robotiq|wsg|greifer|pince|夹爪|夹具|vacuum|valve"
-)
-"""Words in the name of a gripper's or another tool's dimension."""
-
-
-def words(name: str) -> str:
-    """Return the words of a name in lower case, with blanks between: `joint 1 delta x`."""
-    apart = re.sub("(?<=[a-z])(?=[A-Z])", " ", re.sub("[Δ∆δ]", " delta ", name))
-    return " ".join(re.findall(r"[^\W\d_]+|\d+", apart.lower()))
 
 
 @dataclass(frozen=True)
@@ -98,12 +80,7 @@ class PlanFormat:
         as in m/s, is no increment; nor is `d_joint1` beside `joint1` or `dx` beside `x`, which are
         rates in exports and states.
         """
-        rates = {each + name.lower() for name in self.names for each in ("d", "d_", "dd_")}
-        return tuple(
-            i
-            for i, (name, unit) in enumerate(zip(self.names, self.units, strict=True))
-            if _INCREMENT.search(words(name)) and name.lower() not in rates and not per_time(unit)
-        )
+        return increments(self.names, self.units)
 
     def toward(self, frames: Frames, pose: Point) -> Frames:
         """Return a motion in the turns and signs in which its first frame is nearest to a pose.

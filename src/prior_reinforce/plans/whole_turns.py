@@ -30,7 +30,9 @@ _OF_A_LIMB = re.compile(
 what an arm holds, are."""
 _WHOLE_CIRCLE = re.compile(rf"(^|[^a-z])({CIRCLES})($|[^a-z])", re.IGNORECASE)
 _QUATERNION = re.compile(r"(?P<stem>.*?)(?P<part>(?<![a-z])q[._]?[xyzw]|[._ /]?[xyzw])", re.I)
-_OF_ATTITUDE = re.compile(r"quat|orient|rot|attitude|(^|[^a-z])q$", re.IGNORECASE)
+ATTITUDE = "quat|orient|attitude"
+"""Words of attitudes."""
+_OF_ATTITUDE = re.compile(rf"{ATTITUDE}|rot|(^|[^a-z])q$", re.IGNORECASE)
 _VECTOR = re.compile(r"(?P<stem>.*?)(?P<part>(?<![a-z])r[._]?[xyz]|[._ /]?[xyz])", re.IGNORECASE)
 _OF_VECTOR = re.compile(r"rot_?vec|axis_?angle", re.IGNORECASE)
 _PATTERNS = ((_QUATERNION, _OF_ATTITUDE, "wxyz"), (_VECTOR, _OF_VECTOR, "xyz"))

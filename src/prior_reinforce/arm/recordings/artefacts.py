@@ -12,10 +12,10 @@ from itertools import product
 import numpy as np
 from jaxtyping import Float
 
-from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.time_finder import Times
 from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.plans.channels import Kind, kinds
 from prior_reinforce.plans.signals import noise
 from prior_reinforce.plans.speeds import Channels
 from prior_reinforce.plans.whole_turns import HALF, TURN

@@ -18,7 +18,6 @@ from typing import NamedTuple
 import numpy as np
 
 from prior_reinforce.arm.recordings.beside import columns_beside, twin_vectors
-from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.clock import NO_COLUMN
 from prior_reinforce.arm.recordings.naming import find_channels, numbered_like, vectors, words
 from prior_reinforce.arm.recordings.options import ReadOptions
@@ -49,6 +48,7 @@ from prior_reinforce.arm.recordings.tables import PLAIN, Table, are_units, is_va
 from prior_reinforce.arm.recordings.time_finder import FEWEST_COUNTS, Times
 from prior_reinforce.arm.recordings.units import Ambiguity, known_unit, say_names
 from prior_reinforce.errors import FileFormatError
+from prior_reinforce.plans.channels import Kind, kinds
 
 SUFFIXES = (".csv", ".tsv")
 IN_TEXT = (".txt", ".dat", ".log")

@@ -10,7 +10,6 @@ from functools import cached_property
 import numpy as np
 
 from prior_reinforce.arm.recordings.appending import check_scale
-from prior_reinforce.arm.recordings.channels import zero_at_rest
 from prior_reinforce.arm.recordings.naming import find_channels
 from prior_reinforce.arm.recordings.preprocessing import (
     Preprocessed,
@@ -28,6 +27,7 @@ from prior_reinforce.arm.robots.gate_settings import GateSettings
 from prior_reinforce.arm.robots.limits import RobotLimits, joint_of, match_joints
 from prior_reinforce.arm.robots.report import LimitLine, LimitReport
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError, InvalidPlanError
+from prior_reinforce.plans.channels import zero_at_rest
 from prior_reinforce.plans.interpolation import RATE
 from prior_reinforce.plans.motions import Demonstrations, Plan
 from prior_reinforce.plans.plan_format import PlanFormat, summed

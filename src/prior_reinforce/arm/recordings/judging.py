@@ -15,11 +15,11 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.naming import vectors
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.units import Ambiguity, is_possible, judge_unit, say_names
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.plans.channels import Kind, kinds
 from prior_reinforce.plans.plan_format import PlanFormat, summed
 from prior_reinforce.plans.whole_turns import TURN
 from prior_reinforce.units import base_of

@@ -21,7 +21,6 @@ from jaxtyping import Shaped
 
 from prior_reinforce.arm.recordings.beside import may_move
 from prior_reinforce.arm.recordings.bounds import check_bytes, check_numbers
-from prior_reinforce.arm.recordings.channels import Kind, kinds
 from prior_reinforce.arm.recordings.clock import NO_COLUMN, Clock, clock_among, hold_together
 from prior_reinforce.arm.recordings.naming import missing_channels, said_in
 from prior_reinforce.arm.recordings.options import ReadOptions
@@ -29,8 +28,8 @@ from prior_reinforce.arm.recordings.recording import Episodes, Positions, Record
 from prior_reinforce.arm.recordings.stated import recorded_among
 from prior_reinforce.arm.recordings.time_finder import Times, says_time, tells_time
 from prior_reinforce.arm.recordings.units import say_names
-from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.errors import FileFormatError
+from prior_reinforce.plans.channels import Kind, kinds, says_no_position
 
 FrameNumbers = Shaped[np.ndarray, " T"]
 Frames = tuple[FrameNumbers, dict[str, Positions]]

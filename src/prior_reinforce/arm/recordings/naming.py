@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.channels import is_opening
 from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, say_names, split_unit
-from prior_reinforce.arm.robots.limits import is_joint, says_no_position
+from prior_reinforce.arm.robots.limits import is_joint
 from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.plans.channels import is_opening, says_no_position
 
 _POSITIONS = re.compile(r"(^|[^a-z])(q|j|joints?|pos|positions?|angles?)$", re.IGNORECASE)
 """Names of joint positions."""

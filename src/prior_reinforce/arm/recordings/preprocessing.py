@@ -19,12 +19,12 @@ from prior_reinforce.arm.recordings.artefacts import (
     refuse_leaps,
     stalls,
 )
-from prior_reinforce.arm.recordings.channels import zero_at_rest
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.time_finder import LONGEST
 from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.arrays import Frames, Plans
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
+from prior_reinforce.plans.channels import zero_at_rest
 from prior_reinforce.plans.plan_format import stepped, summed
 from prior_reinforce.plans.signals import Signals, analyse, moving_ends, moving_rows
 from prior_reinforce.plans.speeds import Channels, largest_of_unit

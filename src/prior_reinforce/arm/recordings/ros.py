@@ -30,9 +30,9 @@ from prior_reinforce.arm.recordings.recording import (
     unread,
 )
 from prior_reinforce.arm.recordings.trajectories import read_trajectory
-from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import require_inside
+from prior_reinforce.plans.channels import says_no_position
 
 _SUFFIXES = (".bag", ".mcap", ".db3")
 _BAG = "a ROS bag, complete once its recorder ended (else: mcap recover, or ros2 bag reindex)"

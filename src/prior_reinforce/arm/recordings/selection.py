@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from prior_reinforce.arm.recordings.beside import columns_beside, moving_beside
-from prior_reinforce.arm.recordings.channels import Kind, kinds, measured_of, one_for_all
 from prior_reinforce.arm.recordings.judging import UNIT, Given, Judge, beliefs_of
 from prior_reinforce.arm.recordings.naming import (
     find_channels,
@@ -22,9 +21,15 @@ from prior_reinforce.arm.recordings.naming import (
 from prior_reinforce.arm.recordings.recording import Recording, or_leave_out
 from prior_reinforce.arm.recordings.takes import in_one_unit, odd_takes
 from prior_reinforce.arm.recordings.units import Ambiguity, conversion, say_names, split_unit
-from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
-from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.plans.channels import (
+    Kind,
+    increments,
+    kinds,
+    measured_of,
+    one_for_all,
+    says_no_position,
+)
 from prior_reinforce.plans.whole_turns import TURN
 from prior_reinforce.wording import listed
 
@@ -170,8 +175,8 @@ def _refuse_places(
 ) -> None:
     """ConfigurationError if places or velocities are to be a plan's joints: `--joints x y z`."""
     wanted, units = kinds(names), plan_units or [""] * len(names)
-    increments = PlanFormat(tuple(names), tuple(units), 1.0).increments
-    no_joint = {n for i, n in enumerate(names) if wanted[i].is_pose or i in increments}
+    moved = increments(names, units)
+    no_joint = {n for i, n in enumerate(names) if wanted[i].is_pose or i in moved}
     each = zip(joints, names, kinds(joints), units, strict=True)
     turning = [(j, n, kind) for j, n, kind, unit in each if unit in TURN]
     places = [(j, n) for j, n, kind in turning if kind is Kind.PLACE]

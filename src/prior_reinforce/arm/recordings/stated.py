@@ -18,7 +18,6 @@ import numpy as np
 
 from prior_reinforce.arm.recordings.beside import MASK, Arrays, arrays_beside, may_move
 from prior_reinforce.arm.recordings.bounds import check_names
-from prior_reinforce.arm.recordings.channels import Kind, kinds, one_for_all
 from prior_reinforce.arm.recordings.clock import Clock, clock_among
 from prior_reinforce.arm.recordings.naming import (
     OTHER_NAMES,
@@ -37,8 +36,8 @@ from prior_reinforce.arm.recordings.recording import (
 from prior_reinforce.arm.recordings.tables import Table
 from prior_reinforce.arm.recordings.time_finder import rises, says_time
 from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, Ambiguity, known_unit, say_names
-from prior_reinforce.arm.robots.limits import says_no_position
 from prior_reinforce.errors import FileFormatError
+from prior_reinforce.plans.channels import Kind, kinds, one_for_all, says_no_position
 
 if TYPE_CHECKING:
     from prior_reinforce.arm.recordings.options import ReadOptions

@@ -14,13 +14,13 @@ from itertools import chain, pairwise
 import numpy as np
 from jaxtyping import Float
 
-from prior_reinforce.arm.recordings.channels import Kind, kinds, zero_at_rest
 from prior_reinforce.arm.recordings.judging import Belief
 from prior_reinforce.arm.recordings.preprocessing import at_rests
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.units import Ambiguity, judge_unit, known_unit, say_names
 from prior_reinforce.arrays import Plans
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
+from prior_reinforce.plans.channels import Kind, kinds, zero_at_rest
 from prior_reinforce.plans.speeds import SMOOTHING, largest_of_unit, velocity_profiles
 from prior_reinforce.plans.whole_turns import TURN
 from prior_reinforce.units import base_of, factor, spelt, without_number

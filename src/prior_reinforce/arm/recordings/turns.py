@@ -17,11 +17,11 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from prior_reinforce.arm.recordings.channels import Kind, kinds, zero_at_rest
 from prior_reinforce.arm.recordings.selection import Selection
 from prior_reinforce.arm.recordings.takes import so_far
 from prior_reinforce.arm.robots.limits import RobotLimits, joint_of, with_turns
 from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.plans.channels import Kind, kinds, zero_at_rest
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.whole_turns import (

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 
@@ -11,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.errors import ConfigurationError, InvalidPlanError
+from prior_reinforce.plans.channels import is_of_tool, says_no_position
 from prior_reinforce.plans.kinematics import Chain, JointPositions
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.whole_turns import attitudes, whole_circles
@@ -20,18 +20,6 @@ PerJoint = Float[np.ndarray, " D"]
 ENDLESS = 4 * math.pi
 """What any joint may turn either way, in [rad]. Ours: two turns, since a throw that needs more is a
 wrong unit, and a range beyond it a lost decimal point. A joint of that range turns endlessly."""
-_OF_A_GRIPPER = re.compile(r"(^|[_/.])(finger|gripper)s?\d*[_/.]")
-_NO_POSITION = re.compile(
-    r"vel|speed|accel|jerk|torque|tau|effort|force|wrench|current|temperature|cartesian|tcp|pose"
-    r"|delta|δ|∆|increment|relative|residual|derivative|omega"
-    r"|geschwind|beschleun|moment|vitesse|couple|速|力矩|扭矩|トルク|增量|増分"
-    r"|(^|[^a-z])(acc|d+q|qd+|q_?dot|dot|temp|tool|ee|eef|rate|inc|incr|diff|rel|err|error|offset"
-    r"|step|change|noise|std|var|gain|k[pid])($|[^a-z])"
-    r"|(^|[/.:])(d+|v|dv|dt)($|[^a-z])",
-    re.IGNORECASE,
-)
-"""Words of rates, torques, increments and whatever else is no joint position. Ours, and broad on
-purpose: a column that is not taken for a joint's is named, and can be renamed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,11 +116,6 @@ class RobotLimits:
         return low, high
 
 
-def says_no_position(name: str) -> bool:
-    """Whether a name says that it is a rate, a torque, an increment or else, but no position."""
-    return _NO_POSITION.search(f"{name} {re.sub('(?<=[a-z])(?=[A-Z])', '_', name)}") is not None
-
-
 def is_joint(column: str, joint: str) -> bool:
     """Whether a column moves a joint: `joint4`, `panda_joint4` (ROS) and `joint4.pos` (LeRobot) do.
 
@@ -143,7 +126,7 @@ def is_joint(column: str, joint: str) -> bool:
     for name in (column, column.removesuffix(".pos")):
         before = name.removesuffix(joint)
         if before != name and (not before or before[-1] in "_/."):
-            return not (_OF_A_GRIPPER.search(before) or says_no_position(before))
+            return not (is_of_tool(before) or says_no_position(before))
     return False
 
 

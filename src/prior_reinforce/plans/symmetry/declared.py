@@ -13,7 +13,6 @@ odometry, whose increments are along the robot's own, must be recorded as poses.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Iterable, Sequence
 from contextlib import suppress
 from typing import Literal
@@ -22,8 +21,9 @@ import numpy as np
 from msgspec import UNSET
 
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.plans.channels import is_coordinate, is_of_pose, is_tool_state
 from prior_reinforce.plans.kinematics import UPRIGHT, Chain, first_axis, leaning
-from prior_reinforce.plans.plan_format import OF_A_TOOL, PlanFormat, words
+from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.symmetry.moves import (
     NOMINAL_EXPONENT,
     Amplitude,
@@ -43,20 +43,6 @@ from prior_reinforce.units import is_force, kind_of, per_time, rates
 About = Literal["base"] | tuple[float, float] | None
 Distance = Literal["tempo", "amplitude", "learned", "shift"]
 _VECTOR, _QUATERNION = ("rx", "ry", "rz"), ("qw", "qx", "qy", "qz")
-_TOOL = re.compile(
-    rf"{OF_A_TOOL}|magnet|trigger|pump|drive_joint|tool_d[io](?![a-z])|(?<![a-z])hand(_?\d+)?$",
-    re.IGNORECASE,
-)
-"""What is of a tool beside an arm or a hand: `drive_joint` is the xArm's gripper."""
-_COORDINATE = re.compile(r"(?<!\b[qr] )\bd?[xyz]( \d+)?$")
-_ATTITUDE = r"quat|orient|attitude|euler|axis angle"
-_IN_SPACE = (
-    rf"\b([dvr]?[xyz]|q[wxyz])\b|{_ATTITUDE}|\b(rot\w*|pose) (\w+ )*\d"
-    r"|\bd?(roll|pitch|yaw|heading|bearing|azimuth|theta|phi|psi)\b"
-)
-"""What a coordinate or an attitude is called, in `words`; a tool's one angle is its opening."""
-_POSE = rf"{_IN_SPACE}|\brot|\bpose\b|\bd?angle\b"
-"""What anything of a pose is called that is no tool's."""
 _ON_AXIS = 1e-3
 """How far from the first joint's axis a place may be and be on it, [m]. Ours: half a turn about the
 one or the other then differs by 2 mm."""
@@ -256,21 +242,18 @@ def _refuse_left_behind(
 
 def _stays(form: PlanFormat, name: str) -> bool:
     """Whether a column is a tool's opening, or one number a plan, and so is right in any place."""
-    if _TOOL.search(name):
-        return re.search(_IN_SPACE, words(name)) is None
-    return name in form.per_plan and re.search(_POSE, words(name)) is None
+    return is_tool_state(name) or (name in form.per_plan and not is_of_pose(name))
 
 
 def _places(form: PlanFormat) -> list[int]:
     """Columns of a length, or whose name says a coordinate, as units may have been guessed."""
     turned = {name for group in (*form.attitudes, *attitudes(form.names)) for name in group}
     turned |= {name for group in euler_angles(form.names, form.units) for name in group}
-    turned |= {name for name in form.names if re.search(rf"{_ATTITUDE}|\brot|\bangle", words(name))}
     turned |= {n for n, unit in zip(form.names, form.units, strict=True) if is_force(unit)}
     return [
         i
         for i, (name, unit) in enumerate(zip(form.names, form.units, strict=True))
-        if kind_of(unit) == "length" or (name not in turned and _COORDINATE.search(words(name)))
+        if kind_of(unit) == "length" or (name not in turned and is_coordinate(name))
     ]
 
 

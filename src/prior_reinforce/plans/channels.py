@@ -1,8 +1,7 @@
-"""What a recorded channel is by its name: one table for all that read, judge and align channels.
+"""What a channel is by its name: one table for all that read, judge, align, move and check one.
 
 A name tells a kind, and the kind the units that its numbers may be in. Some kinds are told by the
-names beside: `x` is a place beside `y`, and an entry of a matrix has eight others. Which names are
-no position of a robot's joint at all, a rate for instance, `robots.limits.says_no_position` tells.
+names beside: `x` is a place beside `y`, and an entry of a matrix has eight others.
 """
 
 from __future__ import annotations
@@ -12,9 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 from enum import Enum
 from itertools import takewhile
 
-from prior_reinforce.plans.plan_format import OF_A_TOOL, PlanFormat
-from prior_reinforce.plans.whole_turns import CIRCLES, TURN, attitudes, euler_angles
-from prior_reinforce.units import base_of, is_rate
+from prior_reinforce.plans.whole_turns import ATTITUDE, CIRCLES, TURN, attitudes, euler_angles
+from prior_reinforce.units import base_of, is_rate, per_time
 
 
 class Kind(Enum):
@@ -52,8 +50,42 @@ _USUAL = {
     Kind.TURN_RATE: "rad/s",
 }
 """Units of kinds that have the same whatever their numbers."""
+_ANGLES = rf"{CIRCLES}|pitch|theta|phi|psi"
+_INCREMENT = re.compile(
+    rf"\b(d(r?[xyz]|{_ANGLES}|angle|pos|rot|joint|grip(per)?)"
+    r"|delta(?! \d+$)|incr?|increments?|world vector)\b|^d (?!\d|q\b)"
+)
+"""What an increment is called, in `words`; `world_vector` is that of RT-1 (Open X-Embodiment), and
+`delta_1` a joint of a delta robot."""
+_SPEED = r"((?<!le|ra)vel(?!op)|speed|geschwind|vitesse|速|omega)"
+"""What a speed is called; `level` and `travel` are none."""
+_LOAD = "force|torque|wrench|effort"
+_RATE_OR_LOAD = re.compile(rf"{_SPEED}|{_LOAD}|acc", re.IGNORECASE)
+_NO_POSITION = re.compile(
+    rf"{_SPEED}|{_LOAD}|accel|jerk|tau|current|temperature|cartesian|tcp|pose"
+    r"|delta|δ|∆|increment|relative|residual|derivative|beschleun|moment|couple|力矩|扭矩|トルク"
+    r"|增量|増分|(^|[^a-z])(acc|d+q|qd+|q_?dot|dot|temp|tool|ee|eef|rate|inc|incr|diff|rel|err"
+    r"|error|offset|step|change|noise|std|var|gain|k[pid])($|[^a-z])"
+    r"|(^|[/.:])(d+|v|dv|dt)($|[^a-z])",
+    re.IGNORECASE,
+)
+"""Words of rates, torques, increments and whatever else is no joint position. Ours, and broad on
+purpose: a column that is not taken for a joint's is named, and can be renamed."""
+_TOOL = (
+    r"grip|jaw|finger|width|claw|opening|suction|robotiq|wsg|greifer|pince|夹爪|夹具|vacuum|valve"
+    r"|magnet|trigger|pump|knuckle|thumb|pinch|tong|drive joint|tool d[io]\b"
+)
+"""Words of a gripper or another tool, in `words`: `drive_joint` is the xArm's gripper."""
+_OF_TOOL = re.compile(rf"{_TOOL}|\bhand( \d+)?$")
+_OF_COORDINATE = re.compile(r"(?<!\b[qr] )\bd?[xyz]( \d+| delta)?$|world vector")
+_ATTITUDE = rf"{ATTITUDE}|euler|axis angle"
+_OF_ATTITUDE = re.compile(rf"{_ATTITUDE}|\brot|\bangle")
+_IN_SPACE = rf"\b([dvr]?[xyz]|q[wxyz])\b|{_ATTITUDE}|\b(rot\w*|pose) (\w+ )*\d|\bd?({_ANGLES})\b"
+"""What a coordinate or an attitude is called, in `words`; a tool's one angle is its opening."""
+_OF_POSE = re.compile(rf"{_IN_SPACE}|\brot|\bpose\b|\bd?angle\b")
+
 _TURN = rf"{CIRCLES}|pitch|rotation|angle|winkel"
-_ALWAYS = rf"{_TURN}|d(r[xyz]|roll|pitch|yaw|heading)|mcp|pip|dip|cmc|flex(ion)?|abd(uction)?"
+_ALWAYS = rf"{_TURN}|d(r[xyz]|{_ANGLES})|mcp|pip|dip|cmc|flex(ion)?|abd(uction)?"
 _ALONE = "j|q|a"
 _WITHIN = (
     rf"{_TURN}|joint|axis|achse|gelenk|rot|turn|twist|swing|steer|theta|phi|psi|alpha|beta|gamma"
@@ -61,33 +93,26 @@ _WITHIN = (
     r"|head|pan|tilt"
 )
 """Words of angles: that outweigh a gripper's, that stand alone, or within others (`Handgelenk`)."""
-_TOOL = rf"{OF_A_TOOL}|pressure|force|torque|voltage|temperature"
 _RAIL = r"rail|track|linear|slider?|gantry|prismatic|carriage"
-_SLIDE = rf"[de]\d|ext(ernal)?([_ ]?axis)?[_ ]?\d*|{_RAIL}"
-_ALONG = rf"[xyz]|{_RAIL}|belt|conveyor|(tcp|eef?)(?!.*[3-5]\]?$)"
+_SLIDE = r"(^|\b(?!d?q|tau|ee|elbow)\w+ )[de] \d"
+_ALONG = rf"[xyz]|{_RAIL}|belt|conveyor|(tcp|eef?)(?!.* [3-5]$)"
 """What goes at m/s; of six numbered speeds of a tool, `actual_TCP_speed_0` (UR), the last turn."""
-
-
-def _word(words: str) -> str:
-    """A pattern of words that stand apart from other letters."""
-    return rf"(^|[^a-z])({words})s?($|[^a-z])"
-
-
-_RATE = r"([._ ]?(vel(ocit(y|ies))?|speeds?)[_.\[ ]*\d*\]?)"
 _BY_NAME = (
-    (re.compile(r"(^|.*[^a-z])(d_?|delta[_. ]?)[xyz]|.*torso_?lift.*", re.IGNORECASE), Kind.LENGTH),
-    (re.compile(rf"(^|.*[^a-z])(v[xyz]|({_ALONG}){_RATE})", re.IGNORECASE), Kind.VELOCITY),
-    (re.compile(rf"(^|.*[^a-z])(w[xyz]|(dq|qd)[_.\[ ]*\d+\]?)|.*{_RATE}", re.I), Kind.TURN_RATE),
-    (re.compile(r".*quat(ernion)?[_.\[ ]*\d\]?", re.IGNORECASE), Kind.QUATERNION),
-    (re.compile(r".*(rot_?vec|axis_?angle)[_.\[ ]*\d\]?", re.IGNORECASE), Kind.ROTATION),
-    (re.compile(r".*rot(ation)?_?6d.*", re.IGNORECASE), Kind.MATRIX),
+    (r"\bd ?[xyz]$|torso ?lift", Kind.LENGTH),
+    (rf"\bw[xyz]$|omega|\b(dq|qd|d q|q ?dot)\b|\b({_ANGLES}|turn) rate\b", Kind.TURN_RATE),
+    (rf"\b(ang|rot).*{_SPEED}|{_SPEED}.*\bang", Kind.TURN_RATE),
+    (rf"\bv[xyz]$|\b({_ALONG}) ?{_SPEED}|{_SPEED}\w* ([xyz]|lin)\b", Kind.VELOCITY),
+    (_SPEED, Kind.TURN_RATE),
+    (r"quat(ernion)? \d$", Kind.QUATERNION),
+    (r"(rot ?vec|axis ?angle) \d$", Kind.ROTATION),
+    (r"rot(ation)? ?6 ?d\b", Kind.MATRIX),
 )
-"""Kinds by what the whole name is, unless it is a gripper's; the first counts."""
+"""Kinds by what the name says in `words`, unless it is of a tool; the first counts."""
 _BY_WORD = (
-    (re.compile(_word(_ALWAYS), re.IGNORECASE), Kind.ANGLE),
-    (re.compile(_TOOL, re.IGNORECASE), Kind.TOOL),
-    (re.compile(_word(_SLIDE), re.IGNORECASE), Kind.SLIDE),
-    (re.compile(rf"{_word(_ALONE)}|{_WITHIN}", re.IGNORECASE), Kind.ANGLE),
+    (rf"\b({_ALWAYS})s?\b", Kind.ANGLE),
+    (rf"{_TOOL}|{_LOAD}|pressure|voltage|temperature", Kind.TOOL),
+    (rf"\b({_RAIL}|ext(ernal)?( ?axis)?)s?\b|{_SLIDE}", Kind.SLIDE),
+    (rf"\b({_ALONE})s?\b|{_WITHIN}", Kind.ANGLE),
 )
 """Kinds by a word in the name; the first counts."""
 _COORDINATE = re.compile(r"(?P<group>|.*[^a-z0-9])(?P<part>[xyz])([ _-]?ax[ei]s)?", re.IGNORECASE)
@@ -132,31 +157,86 @@ def kinds(names: Sequence[str]) -> tuple[Kind, ...]:
     """Return what each of a recording's channels is."""
     of_group = {name: Kind.PLACE for name in _grouped(names, _COORDINATE, _are_place)}
     of_group |= {name: Kind.MATRIX for name in _grouped(names, _ENTRY, _are_matrix)}
-    poses: dict[str, list[str]] = {}
+    poses: dict[tuple[str, str | None], list[str]] = {}
     for name in names:
-        match = _POSE.fullmatch(name.strip())
-        if match and (
-            match["place"] or _by_word(match["group"]) is not Kind.ANGLE
-        ):  # `joint_pose_0`
-            poses.setdefault(match["group"], []).append(name)
-    for pose in poses.values():
-        match = _POSE.fullmatch(pose[0].strip())
-        if len(pose) > 3 or (match and match["place"]):
+        if match := _POSE.fullmatch(name.strip()):
+            poses.setdefault((match["group"], match["place"]), []).append(name)
+    for (group, place), pose in poses.items():  # `joint_pose_0` is none
+        if place or (len(pose) > 3 and _by_word(group) is not Kind.ANGLE):
             of_group |= zip(sorted(pose), _PARTS_OF_POSE.get(len(pose), ()), strict=False)
-    for group in attitudes(names):
-        of_group |= dict.fromkeys(group, Kind.QUATERNION if len(group) == 4 else Kind.ROTATION)
+    for parts in attitudes(names):
+        of_group |= dict.fromkeys(parts, Kind.QUATERNION if len(parts) == 4 else Kind.ROTATION)
     found = [of_group.get(name) or _by_word(name) for name in names]
     for i in [*_place_beside_attitude(names, found)]:
         found[i] = Kind.PLACE
+    for name, of in _rates_beside(names).items():
+        i, both = names.index(name), {found[names.index(name)], found[names.index(of)]}
+        if found[i] is not Kind.TOOL:
+            found[i] = Kind.VELOCITY if both & {Kind.PLACE, Kind.LENGTH} else Kind.TURN_RATE
     return tuple(found)
+
+
+def words(name: str) -> str:
+    """Return the words of a name in lower case, with blanks between: `joint 1 delta x`."""
+    apart = re.sub("(?<=[a-z])(?=[A-Z])", " ", re.sub("[Δ∆δ]", " delta ", name))
+    return " ".join(re.findall(r"[^\W\d_]+|\d+", apart.lower()))
+
+
+def is_increment(name: str) -> bool:
+    """Whether a name says by how much a pose moves on in a frame: `dx`, `joint1_delta`."""
+    return _INCREMENT.search(words(name)) is not None
+
+
+def increments(names: Sequence[str], units: Sequence[str]) -> tuple[int, ...]:
+    """Return the columns of increments (`PlanFormat.increments`), which no rates are."""
+    rates, each = _rates_beside(names), enumerate(zip(names, units, strict=True))
+    return tuple(i for i, (n, u) in each if is_increment(n) and n not in rates and not per_time(u))
+
+
+def _rates_beside(names: Sequence[str]) -> dict[str, str]:
+    """Rates called like increments, as exports and states have, and of what: `dx` beside `x`."""
+    own = {name.lower(): name for name in names}
+    each = [(name, name.lower().removeprefix(d)) for d in ("d_", "d") for name in names]
+    return {name: own[of] for name, of in each if own.get(of, name) != name}
+
+
+def is_of_tool(name: str) -> bool:
+    """Whether a name is of a gripper, another tool or a hand: `jaw_x`, `suction`, `panda_hand`."""
+    return _OF_TOOL.search(words(name)) is not None
+
+
+def is_tool_state(name: str) -> bool:
+    """Whether a number is right wherever its tool is: `jaw_angle`, `magnet`, but not `jaw_x`."""
+    return is_of_tool(name) and not re.search(_IN_SPACE, words(name))
+
+
+def is_of_pose(name: str) -> bool:
+    """Whether a name says anything of a pose: a coordinate, an angle of an attitude, a speed."""
+    return _OF_POSE.search(words(name)) is not None
+
+
+def is_coordinate(name: str) -> bool:
+    """Whether a name says a coordinate, or a displacement along one: `tool_dx`, not `angle_x`."""
+    called = words(name)
+    return bool(_OF_COORDINATE.search(called)) and not _OF_ATTITUDE.search(called)
+
+
+def is_rate_or_load(name: str) -> bool:
+    """Whether a name says a speed, an acceleration, a force or a torque."""
+    return _RATE_OR_LOAD.search(name) is not None
+
+
+def says_no_position(name: str) -> bool:
+    """Whether a name says that it is a rate, a torque, an increment or else, but no position."""
+    called = f"{name} {re.sub('(?<=[a-z])(?=[A-Z])', '_', name)}"
+    return _NO_POSITION.search(called) is not None or is_increment(name)
 
 
 def zero_at_rest(names: Sequence[str], units: Sequence[str | None]) -> list[int]:
     """Return the columns that are 0 at rest: increments, and speeds by their name or their unit."""
-    form = PlanFormat(tuple(names), tuple(unit or "1" for unit in units), 1.0)
-    speeds, increments = (Kind.VELOCITY, Kind.TURN_RATE), form.increments
-    each = enumerate(zip(form.units, kinds(names), strict=True))
-    return [i for i, (u, kind) in each if i in increments or kind in speeds or is_rate(u)]
+    known, speeds = [unit or "1" for unit in units], (Kind.VELOCITY, Kind.TURN_RATE)
+    summed, each = increments(names, known), enumerate(zip(known, kinds(names), strict=True))
+    return [i for i, (u, kind) in each if i in summed or kind in speeds or is_rate(u)]
 
 
 def one_for_all(
@@ -177,11 +257,11 @@ def one_for_all(
 
 
 def _by_word(name: str) -> Kind:
-    for pattern, kind in _BY_NAME:
-        if pattern.fullmatch(name.strip()) and not re.search(_TOOL, name, re.IGNORECASE):
-            return kind
-    spaced = re.sub("(?<=[a-z0-9])(?=[A-Z])", "_", name)  # `baseYaw` as `base_Yaw`
-    return next((kind for pattern, kind in _BY_WORD if pattern.search(spaced)), Kind.UNKNOWN)
+    if is_increment(name) and is_coordinate(name):
+        return Kind.LENGTH
+    table = _BY_WORD if is_tool_state(name) else (*_BY_NAME, *_BY_WORD)
+    called = words(name)
+    return next((kind for pattern, kind in table if re.search(pattern, called)), Kind.UNKNOWN)
 
 
 def _place_beside_attitude(names: Sequence[str], found: Sequence[Kind]) -> Iterator[int]:

@@ -2,7 +2,20 @@
 
 import pytest
 
-from prior_reinforce.arm.recordings.channels import Kind, kinds, one_for_all
+from prior_reinforce.plans.channels import (
+    Kind,
+    increments,
+    is_coordinate,
+    is_increment,
+    is_of_pose,
+    is_of_tool,
+    is_rate_or_load,
+    is_tool_state,
+    kinds,
+    one_for_all,
+    says_no_position,
+    zero_at_rest,
+)
 
 
 @pytest.mark.parametrize(
@@ -14,8 +27,8 @@ from prior_reinforce.arm.recordings.channels import Kind, kinds, one_for_all
         ),
         (Kind.ANGLE, "gripper_yaw Gripper/Roll index_finger_mcp linear_angle"),
         (Kind.TOOL, "gripper finger_joint1 robotiq_pos pressure 夹爪 linear_gripper Greiferweite"),
-        (Kind.SLIDE, "E1 d3 rail ext_axis_1 linearAxis slider prismatic_joint"),
-        (Kind.UNKNOWN, "foo magnet crank spring x z"),
+        (Kind.SLIDE, "E1 d3 scara_d3 axis_E1 rail ext_axis_1 linearAxis slider prismatic_joint"),
+        (Kind.UNKNOWN, "foo crank spring x z level travel tau_d_1"),
         (Kind.PLACE, "tool.x tool.y"),
         (Kind.PLACE, "X_axis Y_axis Z_axis"),
         (Kind.PLACE, "gripper_tip_x gripper_tip_y gripper_tip_z"),
@@ -26,7 +39,21 @@ from prior_reinforce.arm.recordings.channels import Kind, kinds, one_for_all
         (Kind.TURN_RATE, "wz dq0 joint1_vel theta.vel qd_3 joint_velocity_0"),
         (Kind.TURN_RATE, "actual_TCP_speed_3 tcp_angular_vel"),
         (Kind.ANGLE, "dyaw drx"),
-        (Kind.TOOL, "gripper_vel"),
+        (Kind.TOOL, "gripper_vel magnet trigger pump drive_joint tool_do thumb_1 suction"),
+        (Kind.LENGTH, "dpos_x x_delta Δx inc_y world_vector_0 gripper_dx"),
+        (
+            Kind.VELOCITY,
+            "velocity_x vel_y linear_velocity_z gripper_vx TCPSpeed",
+        ),
+        (
+            Kind.TURN_RATE,
+            "vel_joint4 vitesse_joint4 Gelenkgeschwindigkeit_1 速度_joint4 dq dQ",
+        ),
+        (
+            Kind.TURN_RATE,
+            "q_dot angular_velocity_z omega_x yaw_rate robot0_eef_vel_ang_2 dq_d_0 qdot1",
+        ),
+        (Kind.ANGLE, "dbearing delta_rot_x q_d_1 hand_3"),
         (Kind.PLACE, "robot0_eef_pos_0 robot0_eef_pos_1 robot0_eef_pos_2"),
         (Kind.PLACE, "observation.state.x observation.state.y"),
         (Kind.QUATERNION, "robot0_eef_quat_0 quat_3"),
@@ -39,6 +66,60 @@ def test_a_name_says_what_a_channel_is(kind, names):
     alone = kind not in (Kind.PLACE, Kind.ROTATION, Kind.QUATERNION, Kind.MATRIX)
     for group in ([name] for name in names.split()) if alone else [names.split()]:
         assert {*kinds(group)} == {kind}, group
+
+
+@pytest.mark.parametrize(
+    ("asks", "yes", "no"),
+    [
+        (
+            is_increment,
+            "dx dbearing dpos_x joint1_delta inc_joint4 Δx",
+            "dq dQ d_q d1 delta_1 vx width",
+        ),
+        (is_coordinate, "x tool_dx x2 p2x hip_y x_delta", "qx rx rot_x angle_x euler_z vx pitch"),
+        (is_of_pose, "x vx tool_yaw quat_w jaw_angle pose rot_3", "stiffness width aim"),
+        (
+            is_of_tool,
+            "gripper_x fr3_hand hand_2 robotiq_85 left_knuckle",
+            "joint4 hand_joint4 handle",
+        ),
+        (
+            is_tool_state,
+            "jaw_angle magnet finger_1 right_hand",
+            "jaw_x gripper_yaw finger_quat_0",
+        ),
+        (
+            is_rate_or_load,
+            "vel_joint4 joint_force velocità.x acc_z",
+            "base_pose level_x",
+        ),
+        (
+            says_no_position,
+            "dyaw drx dx gripper_dyaw world_vector_0 joint4.torque ddq_1 tcp_pose left/d_joint1",
+            "joint4 q_1 level_joint4 travelled dynamixel_1 gripper",
+        ),
+    ],
+)
+def test_a_name_answers_each_question(asks, yes, no):
+    assert [name for name in yes.split() if not asks(name)] == []
+    assert [name for name in no.split() if asks(name)] == []
+
+
+@pytest.mark.parametrize(
+    ("names", "rates"),
+    [
+        ("x y theta dx dy dtheta", (Kind.VELOCITY, Kind.VELOCITY, Kind.TURN_RATE)),
+        ("joint1 d_joint1", (Kind.TURN_RATE,)),
+        ("X DX", (Kind.VELOCITY,)),
+    ],
+)
+def test_what_is_called_like_an_increment_beside_its_own_is_a_rate(names, rates):
+    names = names.split()
+    own, units = len(names) - len(rates), [None] * len(names)
+    assert kinds(names)[own:] == rates
+    assert zero_at_rest(names, units) == [*range(own, len(names))]
+    assert increments(names, ["m"] * len(names)) == ()
+    assert increments(names[own:], ["m"] * len(rates)) == (*range(len(rates)),)
 
 
 def test_places_and_joints_are_told_apart_by_what_x_and_y_are_of():
