@@ -7,6 +7,7 @@ from prior_reinforce.arm.recordings.artefacts import refuse_leaps
 from prior_reinforce.arm.recordings.preprocessing import Preprocessing, preprocess
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.plans.plan_format import PlanFormat
 from tests.arm.recordings.recorded import JOINTS, sampled
 
 
@@ -111,8 +112,8 @@ def test_steps_between_rests_and_lost_frames_are_none(rate, sigma):
 
 
 def remarks(t, q, names=JOINTS):
-    units = ("rad",) * len(names)
-    return preprocess([Recording("7", t, q, names)], units, Preprocessing()).remarks
+    form = PlanFormat(names, ("rad",) * len(names), 1.0)
+    return preprocess([Recording("7", t, q, names)], form, Preprocessing()).remarks
 
 
 def with_stall(t, q, first, frames):

@@ -37,6 +37,13 @@ from tests.arm.recordings.recorded import (
 UNITS = ("rad",) * 7
 
 
+def form(*units, names=()):
+    return PlanFormat(names or tuple(f"q{i}" for i in range(len(units))), units, 1.0)
+
+
+FORM, STEPS = form(*UNITS), ("dx", "q")
+
+
 def recording(t, q, name="0"):
     return Recording(name, t, np.asarray(q, dtype=float))
 
@@ -46,7 +53,7 @@ def throws(rate=100):
 
 
 def test_still_ends_go_and_a_margin_stays():
-    done = preprocess(throws(), UNITS, Preprocessing())
+    done = preprocess(throws(), FORM, Preprocessing())
     for i in range(N):
         # The largest motion is 0.9 * 1.25 rad; half a per cent of it is passed when the minimum
         # jerk polynomial reaches 0.005 * 1.25 / (1 + 0.05 i) of this throw's own motion.
@@ -71,7 +78,7 @@ def test_nothing_of_a_soft_start_or_end_is_cut(seconds):
     t = np.arange(round((1.6 + seconds) * 100)) / 100
     s = np.clip((t - 0.8) / seconds, 0, 1)[:, None]
     q = SWING * (10 * s**3 - 15 * s**4 + 6 * s**5)
-    done = preprocess([recording(t, q)], UNITS, Preprocessing())
+    done = preprocess([recording(t, q)], FORM, Preprocessing())
     (start,), (end,) = done.starts, done.ends
     speed = np.abs(np.gradient(q, t, axis=0)).max(axis=1)
     assert max(speed[(t < start) | (t > end)]) <= 0.003 * speed.max()
@@ -85,14 +92,14 @@ def test_encoder_noise_is_no_motion():
     for i in range(N):
         t, q = sampled(i, 100)
         noisy.append(recording(t, q + rng.uniform(-3e-4, 3e-4, q.shape), str(i)))
-    clean = preprocess(throws(), UNITS, Preprocessing())
-    done = preprocess(noisy, UNITS, Preprocessing())
+    clean = preprocess(throws(), FORM, Preprocessing())
+    done = preprocess(noisy, FORM, Preprocessing())
     np.testing.assert_allclose(done.starts, clean.starts, atol=0.011)
     np.testing.assert_allclose(done.ends, clean.ends, atol=0.011)
 
 
 def test_without_trimming_all_stays():
-    done = preprocess(throws(), UNITS, Preprocessing(trim=False))
+    done = preprocess(throws(), FORM, Preprocessing(trim=False))
     assert done.starts == (0.0,) * N
     assert done.plans.shape[1] == 191
     np.testing.assert_array_equal(done.plans[0][:171], sampled(0, 100)[1])
@@ -103,7 +110,7 @@ def test_without_trimming_all_stays():
 def test_a_motion_that_returns_to_its_start_is_kept_whole():
     t = np.arange(300) / 100
     q = np.where((t >= 1) & (t <= 2), np.sin(np.pi * (t - 1)), 0)[:, None]
-    done = preprocess([recording(t, q)] * 2, ("rad",), Preprocessing())
+    done = preprocess([recording(t, q)] * 2, form("rad"), Preprocessing())
     assert done.starts[0] < 1
     assert done.ends[0] > 2
     assert done.plans.max() == 1.0
@@ -111,7 +118,7 @@ def test_a_motion_that_returns_to_its_start_is_kept_whole():
 
 @pytest.mark.parametrize("rate", [20, 50, 1000])
 def test_other_rates_are_resampled_to_the_same_motion(rate):
-    done = preprocess(throws(rate), UNITS, Preprocessing(dt=0.01, trim=False))
+    done = preprocess(throws(rate), FORM, Preprocessing(dt=0.01, trim=False))
     t = np.arange(done.plans.shape[1]) * 0.01
     # Splines through 20 Hz miss a 1 s minimum-jerk swing by 0.2 mrad at most, mostly at its ends.
     for i in range(N):
@@ -125,7 +132,7 @@ def test_jittered_stamps_are_put_on_the_grid():
         t = sampled(i, 100)[0]
         t = np.sort(t + rng.uniform(-0.004, 0.004, t.size))
         jittered.append(recording(t, throw(i, t), str(i)))
-    done = preprocess(jittered, UNITS, Preprocessing(dt=0.01, trim=False))
+    done = preprocess(jittered, FORM, Preprocessing(dt=0.01, trim=False))
     t = np.arange(100) * 0.01
     for i in range(N):
         at = t + jittered[i].times[0]
@@ -140,7 +147,9 @@ def test_increments_at_another_rate_go_the_same_way(rate):
     t = np.arange(60) / 50
     speed = 0.4 * np.sin(np.pi * np.clip((t - 0.2) / 0.8, 0, 1)) ** 2
     steps = np.column_stack([speed / 50, 0.05 - 0.05 * np.cos(2.0 * t)])
-    done = preprocess([recording(t, steps)], ("m", "rad"), Preprocessing(dt=1 / rate), [0])
+    done = preprocess(
+        [recording(t, steps)], form("m", "rad", names=STEPS), Preprocessing(dt=1 / rate)
+    )
     assert done.plans[0, :, 0].sum() == pytest.approx(steps[:, 0].sum(), abs=2e-5)
     middle = int(np.argmax(done.plans[0, :, 0]))
     assert done.plans[0, middle, 0] == pytest.approx(0.4 / rate, rel=0.02)
@@ -153,7 +162,7 @@ def test_increments_at_their_own_rate_stay_and_are_0_once_the_motion_is_over():
     t = np.arange(30) / 50
     steps = np.column_stack([0.01 + 0.002 * np.sin(t * 9), 0.02 * t])
     short, long = recording(t[:20], steps[:20], "0"), recording(t, steps, "1")
-    done = preprocess([short, long], ("m", "rad"), Preprocessing(trim=False), [0])
+    done = preprocess([short, long], form("m", "rad", names=STEPS), Preprocessing(trim=False))
     np.testing.assert_allclose(done.plans[1], steps, atol=1e-12)
     np.testing.assert_allclose(done.plans[0, :20], steps[:20], atol=1e-12)
     np.testing.assert_allclose(done.plans[0, 20:], [[0.0, steps[19, 1]]] * 10, atol=1e-12)
@@ -165,7 +174,7 @@ def test_a_drive_at_constant_speed_is_motion_and_a_speed_is_0_once_the_recording
     turn = np.interp(t, [1.0, 1.1, 1.3, 1.4], [0.0, 0.3, 0.3, 0.0])
     speeds = np.column_stack([drive, turn])
     short, long = recording(t[:80], speeds[:80], "0"), recording(t, speeds, "1")
-    done = preprocess([short, long], ("m/s", "rad/s"), Preprocessing())
+    done = preprocess([short, long], form("m/s", "rad/s"), Preprocessing())
     assert 0.3 < done.starts[0] < 0.5
     np.testing.assert_allclose(
         done.plans[:, :, 0].sum(axis=1) / 30, [drive[:80].sum() / 30, drive.sum() / 30], atol=1e-9
@@ -180,7 +189,7 @@ def test_increments_that_are_missing_in_mid_motion_are_counted(missing, said):
     t = np.arange(60) / 20
     steps = 0.01 * np.interp(t, [0.5, 1.0, 1.5, 2.0], [0.0, 1.0, 1.0, 0.0])[:, None]
     log = recording(np.delete(t, missing), np.delete(steps, missing, axis=0))
-    remarks = preprocess([log], ("m",), Preprocessing(trim=False), [0]).remarks
+    remarks = preprocess([log], form("m", names=STEPS[:1]), Preprocessing(trim=False)).remarks
     assert [said in remark for remark in remarks if "missing" in remark] == [True] * bool(said)
 
 
@@ -189,7 +198,11 @@ def test_late_frames_are_not_lost():
     t = (np.arange(100) + late - late[0]) / 20
     log = recording(t, 0.01 + 0.005 * np.sin(t)[:, None])
     how = Preprocessing(trim=False)
-    assert not [one for one in preprocess([log], ("m",), how, [0]).remarks if "missing" in one]
+    assert not [
+        one
+        for one in preprocess([log], form("m", names=STEPS[:1]), how).remarks
+        if "missing" in one
+    ]
 
 
 @pytest.mark.parametrize(
@@ -199,7 +212,7 @@ def test_speeds_are_0_from_the_frame_after_the_last_by_unit_or_name(names, units
     t = np.arange(30) / 50
     each = np.column_stack([0.01 + 0.002 * np.sin(t * 9), 0.2 + 0.02 * t])
     logs = [Recording(str(n), t[:n], each[:n], names) for n in (20, 30)]
-    done = preprocess(logs, units, Preprocessing(trim=False), [0])
+    done = preprocess(logs, form(*units, names=names), Preprocessing(trim=False))
     np.testing.assert_allclose(done.plans[0], [*each[:20], *[[0.0, 0.0]] * 10], atol=1e-12)
 
 
@@ -215,7 +228,7 @@ def test_a_push_at_constant_speed_is_no_rest(names, push):
 def test_a_gripper_step_does_not_ring():
     t = np.arange(41) / 20
     q = np.column_stack([np.sin(t), (t >= 1.0) * 0.08])
-    done = preprocess([recording(t, q)] * 2, ("rad", "m"), Preprocessing(dt=0.01, trim=False))
+    done = preprocess([recording(t, q)] * 2, form("rad", "m"), Preprocessing(dt=0.01, trim=False))
     assert done.plans[..., 1].min() == 0.0
     assert done.plans[..., 1].max() == pytest.approx(0.08, abs=1e-12)
     np.testing.assert_allclose(
@@ -225,17 +238,17 @@ def test_a_gripper_step_does_not_ring():
 
 
 def test_a_horizon_holds_the_last_pose_and_never_cuts():
-    done = preprocess(throws(), UNITS, Preprocessing(horizon=200))
+    done = preprocess(throws(), FORM, Preprocessing(horizon=200))
     assert done.plans.shape[1] == 200
     np.testing.assert_array_equal(done.plans[:, -1], [sampled(i, 100)[1][-1] for i in range(N)])
     assert done.held == N
     with pytest.raises(InvalidDemonstrationsError, match=r"more than the horizon 50.*never cut"):
-        preprocess(throws(), UNITS, Preprocessing(horizon=50))
+        preprocess(throws(), FORM, Preprocessing(horizon=50))
 
 
 def test_an_end_in_mid_swing_is_remarked():
     cut = [recording(*(part[: 100 + 10 * i] for part in sampled(i, 100)), str(i)) for i in range(2)]
-    done = preprocess(cut, UNITS, Preprocessing())
+    done = preprocess(cut, FORM, Preprocessing())
     moving = "(column1 to column2, column4 to column6)"
     assert done.remarks == (
         f"0: ends in motion, then holds its last pose {moving}",
@@ -248,7 +261,7 @@ def test_a_start_in_mid_swing_is_remarked():
     for i in range(2):
         t, q = sampled(i, 100)
         cut.append(recording(t[60:], q[60:], str(i)))
-    assert preprocess(cut, UNITS, Preprocessing()).remarks == (
+    assert preprocess(cut, FORM, Preprocessing()).remarks == (
         "all: starts in motion (column1 to column2, column4 to column6)",
     )
 
@@ -261,7 +274,7 @@ def test_a_held_joint_with_encoder_noise_is_held_and_at_rest(rate):
     for i in range(N):
         t, q = sampled(i, rate)
         noisy.append(recording(t, q + rng.normal(0, 2e-5, q.shape), str(i)))
-    done = preprocess(noisy, UNITS, Preprocessing(dt=0.0125))
+    done = preprocess(noisy, FORM, Preprocessing(dt=0.0125))
     assert done.remarks == ()
     assert done.held_channels == (2, 6)
     assert done.noise[[2, 6]] == pytest.approx(2e-5, rel=0.4)
@@ -279,7 +292,7 @@ def test_a_joint_that_is_held_is_held_in_the_plans_too(rate, sigma, count):
         t, q = sampled(i, rate)
         q = q + rng.normal(0, sigma, q.shape)
         noisy.append(recording(t, count * np.round(q / count) if count else q, str(i)))
-    done = preprocess(noisy, UNITS, Preprocessing(dt=0.02))
+    done = preprocess(noisy, FORM, Preprocessing(dt=0.02))
     assert done.held_channels == (2, 6)
     form = PlanFormat(tuple(f"joint{i}" for i in range(7)), UNITS, done.dt)
     demos = Demonstrations(done.plans, np.array(list(OUTCOMES.values())), form)
@@ -296,8 +309,8 @@ def test_smoothing_takes_noise_out_and_says_what_it_changed():
         clean.append(q)
         noisy.append(recording(t, q + rng.normal(0, 1e-4, q.shape), str(i)))
     settings = Preprocessing(dt=0.002, trim=False, smooth=20.0)
-    done = preprocess(noisy, UNITS, settings)
-    plain = preprocess(noisy, UNITS, Preprocessing(dt=0.002, trim=False))
+    done = preprocess(noisy, FORM, settings)
+    plain = preprocess(noisy, FORM, Preprocessing(dt=0.002, trim=False))
     assert plain.smoothed is None
     n = len(clean[0])
     off = done.plans[0, :n] - plain.plans[0, :n]
@@ -307,7 +320,7 @@ def test_smoothing_takes_noise_out_and_says_what_it_changed():
     # Of white noise, a fraction of 20 Hz in 250 Hz stays: sqrt(0.08), and the motion is kept.
     assert np.all(left < 0.4e-4)
     with pytest.raises(ConfigurationError, match="no less than half the plans' 500 Hz"):
-        preprocess(noisy, UNITS, Preprocessing(dt=0.002, smooth=250.0))
+        preprocess(noisy, FORM, Preprocessing(dt=0.002, smooth=250.0))
 
 
 @pytest.mark.slow
@@ -317,14 +330,14 @@ def test_smoothing_slower_than_the_motion_is_refused():
     with pytest.raises(
         ConfigurationError, match=r"faster than 0\.05 s, and episode 0 is 0\.02 s long"
     ):
-        preprocess([Recording("0", t, np.column_stack([t, t]))], UNITS[:2], still)
+        preprocess([Recording("0", t, np.column_stack([t, t]))], form(*UNITS[:2]), still)
 
 
 def test_smoothing_leaves_a_gripper_alone():
     t = np.arange(100) / 100
     q = np.column_stack([np.sin(t), (t >= 0.5) * 0.08])
     settings = Preprocessing(dt=0.01, trim=False, smooth=10.0)
-    done = preprocess([recording(t, q)] * 2, ("rad", "m"), settings)
+    done = preprocess([recording(t, q)] * 2, form("rad", "m"), settings)
     np.testing.assert_array_equal(done.plans[0, :, 1], q[:, 1])
 
 
@@ -339,19 +352,19 @@ def test_smoothing_leaves_a_gripper_alone_however_many_frames_it_opens_in(rate, 
         t, q = sampled(i, rate)
         opens = 0.08 * np.clip((t - 0.9) * rate / frames, 0, 1) + sigma * rng.normal(size=t.size)
         recordings.append(recording(t, np.column_stack([q, opens]), str(i)))
-    units = (*UNITS, "m")
-    plain = preprocess(recordings, units, Preprocessing(trim=False))
-    done = preprocess(recordings, units, Preprocessing(trim=False, smooth=20.0))
+    own = form(*UNITS, "m")
+    plain = preprocess(recordings, own, Preprocessing(trim=False))
+    done = preprocess(recordings, own, Preprocessing(trim=False, smooth=20.0))
     np.testing.assert_array_equal(done.plans[..., 7], plain.plans[..., 7])
     assert np.any(done.plans[..., :7] != plain.plans[..., :7])
-    assert analyse(done.plans, units, done.dt).jumps.tolist() == [False] * 7 + [True]
+    assert analyse(done.plans, own.units, done.dt).jumps.tolist() == [False] * 7 + [True]
 
 
 def test_gaps_are_remarked():
     t, q = sampled(0, 100)
     keep = np.ones(t.size, dtype=bool)
     keep[60:80] = False
-    done = preprocess([recording(t[keep], q[keep])] * 2, UNITS, Preprocessing())
+    done = preprocess([recording(t[keep], q[keep])] * 2, FORM, Preprocessing())
     assert done.remarks == ("all: nothing recorded for 0.210 s at 0.59 s",)
 
 
@@ -359,14 +372,14 @@ def test_an_episode_that_never_moves_is_named():
     t, q = sampled(0, 100)
     still = recording(t, np.tile(q[0], (t.size, 1)), "dud")
     with pytest.raises(InvalidDemonstrationsError, match="episode dud never moves"):
-        preprocess([recording(t, q), still], UNITS, Preprocessing())
+        preprocess([recording(t, q), still], FORM, Preprocessing())
 
 
 def test_the_period_snaps_to_a_whole_rate():
     t, q = sampled(0, 100)
-    done = preprocess([recording(t * 1.0004, q)] * 2, UNITS, Preprocessing())
+    done = preprocess([recording(t * 1.0004, q)] * 2, FORM, Preprocessing())
     assert done.dt == 0.01
-    slow = preprocess([recording(t * 13.7, q)] * 2, UNITS, Preprocessing())
+    slow = preprocess([recording(t * 13.7, q)] * 2, FORM, Preprocessing())
     assert slow.dt == pytest.approx(0.137)
 
 
@@ -381,7 +394,7 @@ def test_settings_are_checked(name, value):
 
 def test_a_tiny_time_step_is_refused_before_it_fills_the_memory():
     with pytest.raises(InvalidDemonstrationsError, match="give a larger dt"):
-        preprocess(throws(), UNITS, Preprocessing(dt=1e-9))
+        preprocess(throws(), FORM, Preprocessing(dt=1e-9))
 
 
 @pytest.mark.slow
@@ -398,7 +411,7 @@ def test_plans_start_and_end_where_the_kept_recording_does(seed, period, dt, tri
     for i in range(2):
         t = np.cumsum(rng.uniform(0.5, 1.5, 60) * period)
         made.append(recording(t, throw(i, t), str(i)))
-    done = preprocess(made, UNITS, Preprocessing(dt=dt, trim=trim))
+    done = preprocess(made, FORM, Preprocessing(dt=dt, trim=trim))
     assert np.all(np.isfinite(done.plans))
     for source, plan, start, end in zip(made, done.plans, done.starts, done.ends, strict=True):
         first, last = np.searchsorted(source.times, [start, end])

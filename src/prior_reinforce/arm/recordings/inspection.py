@@ -312,7 +312,7 @@ def inspect(selection: Selection, wanted: Wanted) -> Inspection:
         check_scale(before, selection)
     selection, form = aligned(selection, robot, before)
     how = wanted.preprocessing or Preprocessing()
-    processed = preprocess(selection.recordings, selection.units, how, form.increments, form.names)
+    processed = preprocess(selection.recordings, form, how)
     form = replace(form, dt=processed.dt)
     shown = () if before is None else before.plans
     odd = odd_starts([*shown], [*processed.plans], selection.episodes, form.names, form.units)

@@ -25,7 +25,7 @@ from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.arrays import Frames, Plans
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from prior_reinforce.plans.channels import zero_at_rest
-from prior_reinforce.plans.plan_format import stepped, summed
+from prior_reinforce.plans.plan_format import PlanFormat, stepped, summed
 from prior_reinforce.plans.signals import Signals, analyse, moving_ends, moving_rows
 from prior_reinforce.plans.speeds import Channels, largest_of_unit
 from prior_reinforce.settings import Checked, NonNegative, Positive
@@ -105,28 +105,23 @@ class Preprocessed:
 
 
 def preprocess(
-    recordings: Sequence[Recording],
-    units: Sequence[str],
-    settings: Preprocessing,
-    increments: Sequence[int] = (),
-    names: Sequence[str] = (),
+    recordings: Sequence[Recording], form: PlanFormat, settings: Preprocessing
 ) -> Preprocessed:
-    """Trim and resample N recordings of the same D channels, in `units`, and to one horizon.
+    """Trim and resample N recordings of D channels that are as in `form`, and to one horizon.
 
     Increments are summed up before, and taken between frames after: half as many frames a second
-    have increments twice as large. Speeds rest at 0, told by their units, or by the plan's `names`,
-    which are the recorded ones if not given.
+    have increments twice as large. Speeds rest at 0. The time step is `settings`', not `form`'s.
     InvalidDemonstrationsError if an episode never moves, exceeds the horizon, or leaps.
     """
+    units, increments = form.units, form.increments
     durations = [recording.duration for recording in recordings]
     if increments:
         recordings = [_with_poses(recording, increments) for recording in recordings]
     refuse_leaps(recordings, units)
     dt = settings.dt or _common_dt(recordings)
     recordings = [_held_while_unchanged(recording) for recording in recordings]
-    every, units = [r.positions for r in recordings], tuple(units)
-    speeds = zero_at_rest(names or recordings[0].names, units)
-    speeds = [i for i in speeds if i not in increments]
+    every = [r.positions for r in recordings]
+    speeds = [i for i in zero_at_rest(form.names, units) if i not in increments]
     signals = analyse(every, units, float(np.median([r.period for r in recordings])))
     spans = [(0.0, r.duration) for r in recordings]
     if settings.trim:
