@@ -8,6 +8,8 @@ from prior_reinforce.arm.recordings.time_finder import (
     counts_down,
     find_times,
     is_clock,
+    is_set_back,
+    is_set_on,
     other_times,
     skips_frames,
     tells_time,
@@ -146,3 +148,17 @@ def test_what_is_called_a_time_and_rises_unevenly_is_asked_about():
     assert (doubt.option, doubt.guessed) == ("--time-column time_in_contact", False)
     assert find_times("a", places(time_in_contact=T), ()).guessed == ()
     assert find_times("a", places(time_in_contact=uneven), (0,)).guessed == ()
+
+
+@pytest.mark.parametrize(("by", "set_back"), [(-0.0495, True), (0.0, False), (0.0495, False)])
+def test_a_clock_was_set_back_where_its_order_is_a_longer_way(by, set_back):
+    times = np.arange(100) / 100
+    motion = np.column_stack([np.sin(3 * times), 1e-6 * np.cos(700 * times)])
+    assert is_set_back(times + by * (times > 0.5), motion) is set_back
+    late = np.r_[:50, 51, 50, 52:100]  # frames out of order, whose order by time is the shorter way
+    assert not is_set_back(times[late], motion[late])
+
+
+def test_a_clock_was_set_on_by_more_than_periods_and_jitter():
+    assert is_set_on(np.array([0.05, 0.2, 2.0]), 0.01).tolist() == [False, True, True]
+    assert is_set_on(np.array([0.05, 0.2, 2.0]), 0.1).tolist() == [False, False, True]

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.arm.recordings.recording import Recording
-from prior_reinforce.arm.recordings.time_finder import Times
+from prior_reinforce.arm.recordings.time_finder import Times, is_set_on
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.channels import Kind, kinds
 from prior_reinforce.plans.signals import noise
@@ -46,9 +46,6 @@ _WAITS = 3.0
 """A stall takes more than so many times the usual wait for a new frame. Ours, as of a gap."""
 _ACROSS = 2.0
 """Across a stall a channel moves by so many times its steps around, and about as fast. Ours."""
-_SET, _SHIFT = 3.0, 0.1
-"""A clock was set if it goes on by more than so many periods, and by more than so long, in [s].
-Ours, as of header stamps in ROS."""
 _FAST = 0.5
 """Part of its largest step by which a channel is in mid-motion there. Ours: a log of changes has
 pauses, before which an arm slows down."""
@@ -94,7 +91,7 @@ def _refuse_set_clock(recording: Recording) -> None:
     t, period = recording.times, recording.period
     waits, steps = np.diff(t), np.diff(recording.positions, axis=0)
     shifts = waits - period
-    for k in np.flatnonzero(shifts > max(_SHIFT, _SET * period)).tolist():
+    for k in np.flatnonzero(is_set_on(shifts, period)).tolist():
         around = [i for i in (k - 2, k - 1, k + 1, k + 2) if 0 <= i < len(steps)]
         usual, largest = steps[around].mean(axis=0), np.abs(np.delete(steps, k, axis=0)).max(axis=0)
         fast = np.all(steps[around] * np.sign(usual) > _FAST * largest, axis=0)

@@ -18,15 +18,14 @@ from prior_reinforce.arm.recordings.bounds import check_names
 from prior_reinforce.arm.recordings.naming import find_channels, missing_channels
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import Beside, Positions, Recording, recorded
-from prior_reinforce.arm.recordings.time_finder import Times
+from prior_reinforce.arm.recordings.time_finder import SHIFT, Times, is_set_back, is_set_on
 from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 
 _CLOCKS = {"header": "header stamps", "recorder": "the recorder's stamps"}
 _HEADER, _RECORDER = _CLOCKS
-_JUMP, _DRIFT = 1e8, 0.05
-"""By how much the two clocks of a bag may part within a message, in [ns], and drift apart as a
-share. Ours: queues hold messages for some 10 ms."""
+_DRIFT = 0.05
+"""Share by which the two clocks of a bag may drift apart. Ours."""
 _LATE = 2e8
 """By how much longer a joint's messages may be on their way than others, in [ns]. Ours: more than
 queues hold them, less than clocks nobody synchronised mostly differ by."""
@@ -37,9 +36,6 @@ _ONCE = 2
 """Leaps there and back that a gripper told seldom may make, as it closes and opens. Ours."""
 _HELD = 1e-3
 """Range in [rad] or [m] of a joint that is held, so that no rate tells more of it. Ours."""
-_DETOUR = 0.01
-"""Part of their ranges that joints go further, at least, when sorted by a clock that was set back.
-Ours."""
 _ON_ITS_WAY, _SELDOM, _LOST = 0.05, 0.25, 2.5
 """Part of its greatest speed at which a motion is on its way; part of its range that its fastest
 joint may go between two messages of another joint, an eighth of a smooth motion, where a straight
@@ -327,19 +323,17 @@ def _by_clock(
             f"{bag}: header stamps are 0, or missing, in {unstamped} of {len(messages)} messages "
             f"of {say_names(joints)}; give --time-column {_RECORDER}"
         )
-    # Since the first stamp; since 1970, nanoseconds would be 256 ns coarse as floats.
     sent, came = (
-        np.array([m.at(clock) - messages[0].at(clock) for m in messages], dtype=np.float64)
+        np.array([m.at(clock) - messages[0].at(clock) for m in messages]) * 1e-9
         for clock in _CLOCKS
     )
     in_order = [messages[i] for i in np.argsort(sent, kind="stable")]
     late = int(np.sum(sent < np.maximum.accumulate(sent)))
-    ways = [np.abs(_steps(_positions(each, joints))) for each in (in_order, messages)]
-    detour = float(np.nanmean(np.nansum(ways[0], axis=0) - np.nansum(ways[1], axis=0)))
-    is_set_back = late > 0 and (np.diff(sent).min() < -_JUMP or detour > _DETOUR)
-    if asked == _RECORDER or (asked == _HEADER and is_set_back):
+    went_back = late > 0 and np.diff(sent).min() < -SHIFT
+    went_back = went_back or is_set_back(sent, _positions(messages, joints), _MOVES)
+    if asked == _RECORDER or (asked == _HEADER and went_back):
         return messages, asked, []
-    if asked is None and (unstamped or is_set_back or np.ptp(sent) == 0):
+    if asked is None and (unstamped or went_back or np.ptp(sent) == 0):
         return messages, _RECORDER, ["header stamps unusable, times are those of the recorder"]
     said = [f"{late} messages came late, and are put in order by their header stamps"] * (late > 0)
     if asked == _HEADER:
@@ -348,16 +342,16 @@ def _by_clock(
     apart = np.diff(sent - came)
     frame = int(np.argmax(np.abs(apart)))
     jump, rest = apart[frame], float(np.sum(apart) - apart[frame])
-    if abs(jump) > max(_JUMP, 3 * period) and abs(rest) < abs(jump) / 2:
+    if is_set_on(np.abs(apart), period)[frame] and abs(rest) < abs(jump) / 2:
         if np.diff(came)[frame] <= 3 * max(period, float(np.median(np.diff(came)))):
             why = (
-                f"header stamps jump by {jump * 1e-9:+.3f} s at {came[frame] * 1e-9:.2f} s, the "
-                "recorder's do not: times are those of the recorder"
+                f"header stamps jump by {jump:+.3f} s at {came[frame]:.2f} s, the recorder's do "
+                "not: times are those of the recorder"
             )
             return messages, _RECORDER, [why]
-    elif abs(sent[-1] - came[-1]) > max(_JUMP, _DRIFT * came[-1]) and came[-1] > 0:
+    elif abs(sent[-1] - came[-1]) > max(SHIFT, _DRIFT * came[-1]) and came[-1] > 0:
         raise FileFormatError(
-            f"{bag}: header stamps last {sent[-1] * 1e-9:.3g} s, the recorder's "
-            f"{came[-1] * 1e-9:.3g} s; say which are right: --time-column {_HEADER}, or {_RECORDER}"
+            f"{bag}: header stamps last {sent[-1]:.3g} s, the recorder's {came[-1]:.3g} s; say "
+            f"which are right: --time-column {_HEADER}, or {_RECORDER}"
         )
     return in_order, _HEADER, said

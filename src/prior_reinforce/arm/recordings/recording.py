@@ -16,7 +16,7 @@ from jaxtyping import Float
 
 from prior_reinforce.arm.recordings.bounds import check_names
 from prior_reinforce.arm.recordings.clock import Clock
-from prior_reinforce.arm.recordings.time_finder import Times
+from prior_reinforce.arm.recordings.time_finder import Times, is_set_back
 from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, Ambiguity, say_names, split_unit
 from prior_reinforce.arrays import Point
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError, PriorReinforceError
@@ -28,8 +28,6 @@ Episodes = Iterable[tuple[str, Callable[[], "Recording"]]]
 """What a format's reader yields: names, and how to read each; left-out episodes are never read."""
 _WIDER = 5
 """Times as many columns without names as frames that no motion has. Ours."""
-_DETOUR = 1.5
-"""A motion whose frames are put in a wrong order goes so many times as far, at least. Ours."""
 _LEAP = 3.0
 """Steps of a motion, as large as its largest, that make a leap. Ours."""
 EPISODE_COLUMNS = tuple(
@@ -136,7 +134,7 @@ class Recording:
             at_rate = "read the frames at their known rate with --time-column none --rate HZ"
             if np.all(np.diff(times) >= 0):
                 remedy = f"it repeats, as of a coarse clock: {at_rate}, or by another --time-column"
-            elif _way(positions[np.argsort(times)]) > _DETOUR * _way(positions):
+            elif is_set_back(times, positions):
                 remedy = "the joints go on as if the frames were in order, so it is the times that "
                 remedy += "are wrong, as where a clock was set back, or nanoseconds behind a point "
                 remedy += f"lack their zeros: {at_rate}, or leave that episode out"
@@ -166,12 +164,6 @@ class Recording:
     def period(self) -> float:
         """Median time between two frames, in [s]."""
         return float(np.median(np.diff(self.times)))
-
-
-def _way(positions: Positions) -> float:
-    """How far the channels go in all, each in shares of its range."""
-    ranges = np.ptp(positions, axis=0)
-    return float(np.sum(np.abs(np.diff(positions, axis=0)) / np.where(ranges > 0, ranges, 1)))
 
 
 def refuse_exchanged(episode: str, positions: Positions) -> None:

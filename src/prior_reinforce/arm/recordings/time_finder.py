@@ -49,6 +49,12 @@ _TICKS = (6.3e17, 6.6e17)
 """Numbers that are .NET's ticks of 100 ns since the year 1, from 1997 to 2092."""
 _EPOCH = (1e9, 4.1e9)
 """Seconds since 1970, from 2001 to 2099, in which a clock that is set counts."""
+_PERIODS, SHIFT = 3.0, 0.1
+"""A clock was set if it goes on by more than so many periods, and by more than so long, in [s].
+Ours: queues of messages hold them for some 10 ms."""
+_DETOUR, _MOVES = 0.01, 0.02
+"""Part of their ranges that channels go further, at least, in the order of a clock that was set
+back, and part of the largest range that a channel moves by, at least. Ours."""
 _NEARLY, _ANY_SPEED = 1.25, 2.5
 """Factors within which what rises must run as fast as a rate says, to be a clock: an array of any
 kind, and what steps as a sampler does. Ours."""
@@ -265,6 +271,23 @@ def are_ticks(values: Stamps) -> bool:
         return False
     length = 1e-9 * float(values.max() - values.min())
     return length < _SHORTEST or values.size / length > _FASTEST
+
+
+def is_set_on(shift: Times, period: float) -> np.ndarray:
+    """Whether a clock was set, wherever it goes on by so much more than its period, in [s]."""
+    return shift > max(SHIFT, _PERIODS * period)
+
+
+def is_set_back(times: Stamps, positions: Float[np.ndarray, "T D"], least: float = 0.0) -> bool:
+    """Whether a clock was set back: in the order of its times, channels go further than in a row.
+
+    A range below `least` is no motion.
+    """
+    ranges = np.fmax.reduce(positions) - np.fmin.reduce(positions)
+    in_order = positions[np.argsort(times, kind="stable")]
+    ways = [np.nansum(np.abs(np.diff(each, axis=0)), axis=0) for each in (in_order, positions)]
+    floor = max(least, _MOVES * np.fmax.reduce(ranges, initial=0.0)) or 1.0
+    return bool(np.mean((ways[0] - ways[1]) / np.fmax(ranges, floor)) > _DETOUR)
 
 
 def is_clock(name: str, values: Times, times: Times) -> bool:
