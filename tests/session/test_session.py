@@ -30,7 +30,7 @@ from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.symmetry import TurnJoint, turn_and_scale
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.session import Session, ask_all
-from prior_reinforce.session.trials import Log, Stage, State
+from prior_reinforce.session.trials import Log, SessionState, Stage
 
 DEMOS = Demonstrations(
     plans=np.arange(2 * 3 * 2, dtype=float).reshape(2, 3, 2),
@@ -326,7 +326,7 @@ def test_trials_of_earlier_goals_reach_the_adapter_where_they_are_carried_over(c
 
 def test_trials_of_another_model_teach_nothing(session, monkeypatch):
     session.tell(session.ask().number, [0.05, 0.0])
-    monkeypatch.setattr(State, "in_use", ("another",))
+    monkeypatch.setattr(SessionState, "in_use", ("another",))
     np.testing.assert_array_equal(session.ask().condition, GOAL)
 
 

@@ -51,7 +51,7 @@ from prior_reinforce.commands.workspace import print_goal
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.files import check_path
 from prior_reinforce.parsing import as_place
-from prior_reinforce.session.trials import State, Trial
+from prior_reinforce.session.trials import SessionState, Trial
 from prior_reinforce.terminal import RED, coloured
 from prior_reinforce.wording import in_words, say_place, to_words, too_far
 
@@ -255,7 +255,9 @@ class Ask(OnWorkspace):
                 "--rate is of the file that --out writes; --run is given the plan's own frames"
             )
 
-    def _show(self, workspace: Workspace, state: State, trial: Trial, reached_before: bool) -> None:
+    def _show(
+        self, workspace: Workspace, state: SessionState, trial: Trial, reached_before: bool
+    ) -> None:
         """Print where the trial aims and what the gate says, and write --out."""
         manifest = workspace.manifest
         outcome, goal = manifest.outcome_format, state.goals[trial.goal_number - 1].goal
@@ -292,7 +294,7 @@ class Ask(OnWorkspace):
         out = self.out / "trial-{trial}.npz" if self.out.is_dir() else self.out
         return Path(str(out).replace("{trial}", str(number)))
 
-    def _check_out(self, state: State) -> None:
+    def _check_out(self, state: SessionState) -> None:
         """Say what --out cannot do before a trial is made."""
         trial = state.open_trial
         number = len(state.trials) + 1 if trial is None else trial.number

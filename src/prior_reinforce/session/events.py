@@ -1,7 +1,8 @@
 """What can happen to the trials of a session, as typed events.
 
-A log is a list of events that only grows; what stands is a fold over it (`trials.State`). In a
-journal on disk an event is a JSON object whose `kind` is the name of its class, in snake case.
+A log is a list of events that only grows; what stands is a fold over it
+(`trials.SessionState`). In a journal on disk an event is a JSON object whose `kind` is the name of
+its class, in snake case.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ from prior_reinforce.generators.reach import farthest_between, refusal
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.symmetry import Polar
 from prior_reinforce.session.events import Asked
-from prior_reinforce.session.trials import Goal, Log, State, Verdict
+from prior_reinforce.session.trials import Goal, Log, SessionState, Verdict
 from prior_reinforce.wording import say_place
 
 _RIVAL = "rival"
@@ -65,7 +65,7 @@ class InUse:
         learned = copy.deepcopy(self.generator).fit(shown, seed=0)
         return InUse((learned, copy.deepcopy(self.adapter), shown), (_RIVAL, *self.names[1:]))
 
-    def believed(self, state: State, log: Log) -> InUse:
+    def believed(self, state: SessionState, log: Log) -> InUse:
         """This, or its rival where trials speak against the symmetry; the adapter is informed."""
         doubted = self.informed(state, log).symmetry_doubted
         if not doubted or self.rival is None:
@@ -77,7 +77,7 @@ class InUse:
         """What a new trial needs."""
         return self.generator, self.adapter
 
-    def informed(self, state: State, log: Log) -> Adapter:
+    def informed(self, state: SessionState, log: Log) -> Adapter:
         """The adapter, after it was told all that counts for the goal of now.
 
         It goes on from what it knows, or from what the log kept of it, if that is the beginning of
@@ -98,13 +98,13 @@ class InUse:
             getattr(adapter, what)(*arguments)
         return adapter
 
-    def _expected(self, state: State, condition: Point) -> Expectation:
+    def _expected(self, state: SessionState, condition: Point) -> Expectation:
         """What the adapter expects of the next trial."""
         goal = latest_goal(state)
         return self.adapter.expect(condition, goal.goal, goal.tolerance)
 
     def _asked(
-        self, state: State, condition: Point, verdict: Verdict | None, limited: str = ""
+        self, state: SessionState, condition: Point, verdict: Verdict | None, limited: str = ""
     ) -> Asked:
         """The event of the next trial; `limited` says why it falls short of what was wanted."""
         expected = self._expected(state, condition)
@@ -119,7 +119,7 @@ class InUse:
             expected=replace(expected, remark="; ".join(remarks), beyond=beyond),
         )
 
-    def _remark(self, state: State, expected: Expectation) -> str:
+    def _remark(self, state: SessionState, expected: Expectation) -> str:
         """What a person should know before a trial."""
         if expected.nearer:
             goal = latest_goal(state)
@@ -149,7 +149,7 @@ class InUse:
 
     def passing(
         self,
-        state: State,
+        state: SessionState,
         wanted: Point,
         plan: Frames,
         verdict_on: Callable[[Frames, Point, str], Verdict | None],
@@ -191,7 +191,7 @@ class InUse:
                 raise OutOfReachError(f"trial {n} made the same plan and missed: {expected.remark}")
         return self._asked(state, wanted, verdict), plan, verdict
 
-    def _say_no_plan(self, state: State, condition: Point) -> str:
+    def _say_no_plan(self, state: SessionState, condition: Point) -> str:
         """Say for which goal there is no plan, and whether it is simply too far."""
         goal = latest_goal(state).goal
         form = self.demonstrations.outcome_format
@@ -204,7 +204,7 @@ class InUse:
         return said
 
 
-def _told(state: State, model: str) -> Iterator[tuple[str, tuple[Any, ...]]]:
+def _told(state: SessionState, model: str) -> Iterator[tuple[str, tuple[Any, ...]]]:
     """What an adapter is to be told for the goal of now: its methods, and their arguments."""
     goal, hardware = latest_goal(state), 0
     for trial in [*state.readings_for(goal, model), None]:
@@ -221,7 +221,7 @@ def _told(state: State, model: str) -> Iterator[tuple[str, tuple[Any, ...]]]:
             yield "observe", (trial.condition, about.goal, reading.within(about.tolerance))
 
 
-def _missed(state: State, condition: Point) -> int:
+def _missed(state: SessionState, condition: Point) -> int:
     """Number of a trial for the goal of now that made the same plan and was seen to miss, or 0."""
     tolerance = latest_goal(state).tolerance
     return next(
@@ -235,7 +235,7 @@ def _missed(state: State, condition: Point) -> int:
     )
 
 
-def latest_goal(state: State) -> Goal:
+def latest_goal(state: SessionState) -> Goal:
     """The goal that is worked on.
 
     Raises:

@@ -32,7 +32,7 @@ from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.events import Amended, GoalSet, Told, Voided
 from prior_reinforce.session.in_use import InUse, generated, latest_goal
-from prior_reinforce.session.trials import Goal, Log, Stage, State, Trial, Verdict
+from prior_reinforce.session.trials import Goal, Log, SessionState, Stage, Trial, Verdict
 
 
 class Session:
@@ -57,7 +57,7 @@ class Session:
         """Begin, or go on where a log ends.
 
         The first three may be functions that load them, called when first needed, and again when
-        the log names another model in use (`State.in_use`): telling, voiding and amending need
+        the log names another model (`SessionState.in_use`): telling, voiding and amending need
         neither generator nor adapter. Trials of other models teach nothing, since their conditions
         mean other motions.
 
@@ -114,7 +114,7 @@ class Session:
         return self._parts(self.state).demonstrations
 
     @property
-    def state(self) -> State:
+    def state(self) -> SessionState:
         """What happened so far, whoever wrote it down."""
         return self.log.state()
 
@@ -327,12 +327,12 @@ class Session:
         self.__dict__.update(state, _lock=RLock())
 
     @contextmanager
-    def _exclusive(self) -> Iterator[State]:
+    def _exclusive(self) -> Iterator[SessionState]:
         """Hold the log, and know all that it says."""
         with self._lock, self.log.exclusive():
             yield self.log.state()
 
-    def _parts(self, state: State) -> InUse:
+    def _parts(self, state: SessionState) -> InUse:
         """What is in use as the log says; what was loaded before is forgotten where it is not."""
         with self._lock:
             names = (*state.in_use, "" if state.goal is None else state.goal.adapter)
@@ -370,7 +370,9 @@ class Session:
         if self._check_open is not None:
             self._check_open(trial, verb)
 
-    def _open(self, state: State, parts: InUse, condition: Point, plan: Frames) -> Verdict | None:
+    def _open(
+        self, state: SessionState, parts: InUse, condition: Point, plan: Frames
+    ) -> Verdict | None:
         """Write a new trial down, if its plan may be executed."""
         event, plan, verdict = parts.passing(state, condition, plan, self._verdict)
         self.log.keep_adapter(parts.adapter)
@@ -378,7 +380,7 @@ class Session:
         return verdict
 
     def _with_plan(
-        self, state: State, number: int, fresh: Mapping[Session, Verdict | None]
+        self, state: SessionState, number: int, fresh: Mapping[Session, Verdict | None]
     ) -> Trial:
         """A trial with its plan and the gate's verdict, unless the gate refuses it now.
 
@@ -425,24 +427,22 @@ def ask_all(sessions: Sequence[Session]) -> list[Trial]:
             session._parts(state).load()
             latest_goal(state)  # or refuse
     with ExitStack() as logs:
-        asked, new = list[tuple[State, int]](), dict[Session, State]()
+        asked, new = list[tuple[SessionState, int]](), dict[Session, SessionState]()
         for session in sessions:
             state = logs.enter_context(session._exclusive())
-            trial = state.open_trial
-            if trial is None:
+            if state.open_trial is None:
                 new[session] = state
             else:
-                session._check(trial, "ask")
-            asked.append((state, len(state.trials) + (trial is None)))
+                session._check(state.open_trial, "ask")
+            asked.append((state, len(state.trials) + (session in new)))
         verdicts: dict[Session, Verdict | None] = {}
         if new:
             parts = [s._parts(state).believed(state, s.log) for s, state in new.items()]
             goals = [latest_goal(state).goal for state in new.values()]
             conditions = [each.adapter.propose(g) for each, g in zip(parts, goals, strict=True)]
             plans = generated([each.generator for each in parts], conditions)
-            for (session, state), each, condition, plan in zip(
-                new.items(), parts, conditions, plans, strict=True
-            ):
+            opened = zip(new.items(), parts, conditions, plans, strict=True)
+            for (session, state), each, condition, plan in opened:
                 verdicts[session] = session._open(state, each, condition, plan)
     return [
         session._with_plan(state, number, verdicts)

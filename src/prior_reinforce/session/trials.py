@@ -1,7 +1,7 @@
 """What a session knows: its goals and trials, as the fold of a log of events.
 
-What stands is `State`, so a session can be brought back from its log alone. `Log` keeps the events
-in a list; a workspace's keeps a journal on disk.
+What stands is `SessionState`, so a session can be brought back from its log alone. `Log` keeps
+the events in a list; a workspace's keeps a journal on disk.
 """
 
 from __future__ import annotations
@@ -165,7 +165,7 @@ class Trial:
         return self.stage is Stage.TOLD or self.told_before
 
 
-class State:
+class SessionState:
     """What the events of a log add up to, folded forward one event at a time.
 
     Trials of one goal follow each other, and only the last trial can be open, so that taking in an
@@ -336,13 +336,13 @@ class Log:
 
     def __init__(self) -> None:
         self._entries: list[Entry] = []
-        self._state = State()
+        self._state = SessionState()
 
     def entries(self) -> Sequence[Entry]:
         """All events so far, in order, whoever wrote them."""
         return self._entries
 
-    def state(self) -> State:
+    def state(self) -> SessionState:
         """What happened so far, whoever wrote it.
 
         Raises:
@@ -384,7 +384,7 @@ class Log:
 
 
 def _teaches(trial: Trial, goal: Goal, model: str) -> bool:
-    """Whether an adapter learns from a trial for a goal; see `State.readings_for`."""
+    """Whether an adapter learns from a trial for a goal; see `SessionState.readings_for`."""
     of_goal = trial.goal_number == goal.number
     earlier = goal.carry_over and trial.goal_number < goal.number
     return trial.stage is Stage.TOLD and trial.model == model and (of_goal or earlier)

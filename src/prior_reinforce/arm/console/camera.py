@@ -17,7 +17,7 @@ import numpy as np
 from msgspec import Struct
 
 from prior_reinforce.arm.console.verbs import Verbs
-from prior_reinforce.arm.console.view import State
+from prior_reinforce.arm.console.view import ConsoleState
 from prior_reinforce.environment import SeenObject, TableScene
 from prior_reinforce.errors import ConfigurationError, PerceptionFailedError
 from prior_reinforce.files import named_disk_errors, require_inside, sha256, write
@@ -187,7 +187,7 @@ any one left out, the others fix the plane, so each tells how good the calibrati
 and their middle do not: a corner left out, the others have three on a line."""
 
 
-def _known_points(state: State) -> list[list[float]]:
+def _known_points(state: ConsoleState) -> list[list[float]]:
     """Six points around the demonstrations, on a grid of 10 cm that is easy to measure."""
     axes = [component.axis for component in state.components]
     if not state.shown or not {0, 1} <= {*axes}:

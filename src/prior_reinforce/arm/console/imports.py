@@ -18,7 +18,7 @@ from typing import NamedTuple
 from msgspec import Struct
 
 from prior_reinforce.arm.console.verbs import Seen, Verbs
-from prior_reinforce.arm.console.view import State
+from prior_reinforce.arm.console.view import ConsoleState
 from prior_reinforce.arm.recordings import ReadOptions, Recordings, inspect, read
 from prior_reinforce.arm.recordings.naming import find_channels, numbered_like
 from prior_reinforce.arm.recordings.outcomes import (
@@ -186,7 +186,7 @@ class Imports:
         self._verbs.publish({"recordings": 0})
         return self.look()
 
-    def take(self, body: Take) -> State:
+    def take(self, body: Take) -> ConsoleState:
         """Take the recordings with a known outcome in, as `prior-reinforce import` does."""
         with self._lock, self._verbs.as_seen(body.seen):
             found = self._read()

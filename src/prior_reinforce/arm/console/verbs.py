@@ -21,7 +21,7 @@ from msgspec import Struct, structs
 
 from prior_reinforce.adapters import DEFAULT_ADAPTER
 from prior_reinforce.arm.console import view
-from prior_reinforce.arm.console.view import MotionView, Mover, State
+from prior_reinforce.arm.console.view import ConsoleState, MotionView, Mover
 from prior_reinforce.arm.executing.base import ArmSettings, Motion
 from prior_reinforce.arm.executing.lock import is_executing, last_stop, stop_executing
 from prior_reinforce.arm.workspace.execute import (
@@ -53,7 +53,7 @@ class Seen(Struct, forbid_unknown_fields=True):
     """What every verb says."""
 
     seen: int
-    """`State.id` of the state that the person saw."""
+    """`ConsoleState.id` of the state that the person saw."""
 
 
 class SetGoal(Seen):
@@ -79,7 +79,7 @@ class Execute(Seen):
     sha256: str
     """Of the plan that the person saw."""
     stopped: str
-    """`State.stopped` of that state: after a Stop since then, nothing begins."""
+    """`ConsoleState.stopped` of that state: after a Stop since then, nothing begins."""
     motion: Motion = "trial"
     """What a person was asked for (`Question.motion`)."""
     speed: float = 1.0
@@ -175,7 +175,7 @@ class Verbs:
         self._execution: Future[None] | None = None
         self._learning: tuple[float, float] | None = None
         self._shown_for: tuple[object, ...] = ()
-        self._shown: State
+        self._shown: ConsoleState
         self._closed = threading.Event()
         self._watcher = threading.Thread(target=self._watch, name="journal", daemon=True)
         self._watcher.start()
@@ -191,7 +191,7 @@ class Verbs:
         self._threads.shutdown()
         self.workspace.close()
 
-    def state(self) -> State:
+    def state(self) -> ConsoleState:
         """What the page shows."""
         with self._lock:
             step, entries = self.workspace.standing.step, self.workspace.events
@@ -205,7 +205,7 @@ class Verbs:
                 report=self._report if self._shown.trials else "",
             )
 
-    def goal(self, body: SetGoal) -> State:
+    def goal(self, body: SetGoal) -> ConsoleState:
         """Set a goal, as the one before was set."""
         with self.as_seen(body.seen):
             goals = self.workspace.state.goals
@@ -217,7 +217,7 @@ class Verbs:
             )
         return self.state()
 
-    def ask(self, body: Ask) -> State:
+    def ask(self, body: Ask) -> ConsoleState:
         """Get the next plan; the same one until it is told."""
         with self.as_seen(body.seen):
             recover(self.workspace)
@@ -239,7 +239,7 @@ class Verbs:
             refused = look.refused or (look.approach_refused if motion == "approach" else "")
             return Question(question, say_look(look), motion, is_fast(motion, body.speed), refused)
 
-    def execute(self, body: Execute) -> State:
+    def execute(self, body: Execute) -> ConsoleState:
         """Begin to execute the plan that was seen; returns once the journal says so."""
         with self.as_seen(body.seen):
             trial, by = self._seen_trial(body)
@@ -259,7 +259,7 @@ class Verbs:
             running.result()
         return self.state()
 
-    def stop(self) -> State:
+    def stop(self) -> ConsoleState:
         """Stop what moves the arm for this workspace, whoever started it; it may be nothing."""
         self._halt()
         try:
@@ -267,25 +267,25 @@ class Verbs:
         except PriorReinforceError as error:
             raise WorkspaceError(f"stopped, whatever moved; but {error}") from error
 
-    def tell(self, body: Tell) -> State:
+    def tell(self, body: Tell) -> ConsoleState:
         """Say what was seen of a trial."""
         with self.as_seen(body.seen):
             self._session.tell(body.trial, body.reading, hit=body.hit)
         return self.state()
 
-    def amend(self, body: Tell) -> State:
+    def amend(self, body: Tell) -> ConsoleState:
         """Correct what was said of a trial."""
         with self.as_seen(body.seen):
             self._session.amend(body.trial, body.reading, hit=body.hit)
         return self.state()
 
-    def void(self, body: Void) -> State:
+    def void(self, body: Void) -> ConsoleState:
         """Declare that a trial is not data."""
         with self.as_seen(body.seen):
             self._session.void(body.trial, body.reason)
         return self.state()
 
-    def learn(self, body: Seen) -> State:
+    def learn(self, body: Seen) -> ConsoleState:
         """Begin to learn from the demonstrations in use; an error of it goes to all tabs."""
         with self.as_seen(body.seen):
             if self._learning is not None:

@@ -46,7 +46,7 @@ class Component(Struct):
     tolerance: float
 
 
-class State(StatusView, frozen=True, kw_only=True):
+class ConsoleState(StatusView, frozen=True, kw_only=True):
     """Everything that the page shows, but for the motion of a plan."""
 
     id: int
@@ -67,7 +67,7 @@ class State(StatusView, frozen=True, kw_only=True):
     """Path of the report; empty before the first trial."""
 
 
-def state_of(workspace: Workspace) -> State:
+def state_of(workspace: Workspace) -> ConsoleState:
     """Return what the page shows now.
 
     Raises:
@@ -77,7 +77,7 @@ def state_of(workspace: Workspace) -> State:
     now, entries, shown = workspace.standing, workspace.events, np.empty((0, 0))
     if now.state.demonstrations is not None:
         shown = workspace.demonstrations.outcomes_seen
-    return State(
+    return ConsoleState(
         **structs.asdict(status_view(now)),
         id=entries[-1].id if entries else 0,
         stopped=str(last_stop(workspace.folder)),

@@ -28,7 +28,7 @@ from prior_reinforce.arm.workspace.manifest import Manifest
 from prior_reinforce.arm.workspace.store import Store
 from prior_reinforce.errors import WorkspaceError
 from prior_reinforce.session.events import Event, GoalSet
-from prior_reinforce.session.trials import State, Trial
+from prior_reinforce.session.trials import SessionState, Trial
 
 Stage = Literal["asked", "executing", "executed", "told", "voided"]
 """Where a trial of a workspace stands. `executing`: a command was given the plan; if the program
@@ -40,7 +40,7 @@ Step = Literal[
 moved (`settle`); nothing, since the goal is reached."""
 
 
-class WorkspaceState(State):
+class WorkspaceState(SessionState):
     """What the events of a workspace add up to."""
 
     def __init__(self) -> None:

@@ -12,7 +12,7 @@ from prior_reinforce.arm.workspace.events import Moved, Moving
 from prior_reinforce.arm.workspace.manifest import Manifest, workspace_around
 from prior_reinforce.arm.workspace.state import Standing
 from prior_reinforce.errors import TrialStateError
-from prior_reinforce.session.trials import Stage, State, Trial
+from prior_reinforce.session.trials import SessionState, Stage, Trial
 from prior_reinforce.terminal import plain
 from prior_reinforce.wording import error_example, say_chance, say_reading, say_trials
 
@@ -91,7 +91,7 @@ def say_expectation(now: Standing, trial: Trial) -> list[str]:
     return lines
 
 
-def say_outdated(state: State) -> list[str]:
+def say_outdated(state: SessionState) -> list[str]:
     """Say so where the trial that waits was planned before a correction."""
     trial = state.open_trial
     return [f"trial {trial.number} was {_OUTDATED}"] if trial and trial.outdated else []

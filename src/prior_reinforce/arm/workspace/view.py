@@ -19,7 +19,7 @@ from prior_reinforce.arm.workspace.state import Standing, Step
 from prior_reinforce.arm.workspace.text import goal_step, next_step, say_trial, say_warning
 from prior_reinforce.files import as_cell
 from prior_reinforce.formats import OutcomeFormat
-from prior_reinforce.session.trials import Goal, Stage, State, Trial
+from prior_reinforce.session.trials import Goal, SessionState, Stage, Trial
 from prior_reinforce.terminal import plain
 from prior_reinforce.wording import (
     as_html,
@@ -292,7 +292,7 @@ def status_view(now: Standing) -> StatusView:
     return structs.replace(view, text=describe(view))
 
 
-def _goal_view(state: State, goal: Goal) -> GoalView:
+def _goal_view(state: SessionState, goal: Goal) -> GoalView:
     told = [t for t in state.trials_of(goal.number) if t.stage is Stage.TOLD]
     hits = [count for count, trial in enumerate(told, start=1) if trial.hit]
     return GoalView(
