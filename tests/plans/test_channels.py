@@ -9,7 +9,6 @@ from prior_reinforce.plans.channels import (
     is_increment,
     is_of_pose,
     is_of_tool,
-    is_rate_or_load,
     is_tool_state,
     kinds,
     one_for_all,
@@ -87,11 +86,6 @@ def test_a_name_says_what_a_channel_is(kind, names):
             is_tool_state,
             "jaw_angle magnet finger_1 right_hand",
             "jaw_x gripper_yaw finger_quat_0",
-        ),
-        (
-            is_rate_or_load,
-            "vel_joint4 joint_force velocità.x acc_z",
-            "base_pose level_x",
         ),
         (
             says_no_position,

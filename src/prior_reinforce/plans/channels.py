@@ -43,24 +43,19 @@ class Kind(Enum):
         return "1" if share or self in (Kind.QUATERNION, Kind.MATRIX) else "rad"
 
 
-_USUAL = {
-    Kind.PLACE: "m",
-    Kind.LENGTH: "m",
-    Kind.VELOCITY: "m/s",
-    Kind.TURN_RATE: "rad/s",
-}
+_USUAL = {Kind.PLACE: "m", Kind.LENGTH: "m", Kind.VELOCITY: "m/s", Kind.TURN_RATE: "rad/s"}
 """Units of kinds that have the same whatever their numbers."""
+RATES = (Kind.VELOCITY, Kind.TURN_RATE)
 _ANGLES = rf"{CIRCLES}|pitch|theta|phi|psi"
 _INCREMENT = re.compile(
     rf"\b(d(r?[xyz]|{_ANGLES}|angle|pos|rot|joint|grip(per)?)"
     r"|delta(?! \d+$)|incr?|increments?|world vector)\b|^d (?!\d|q\b)"
 )
-"""What an increment is called, in `words`; `world_vector` is that of RT-1 (Open X-Embodiment), and
+"""What an increment is called, in `_words`; `world_vector` is that of RT-1 (Open X-Embodiment), and
 `delta_1` a joint of a delta robot."""
 _SPEED = r"((?<!le|ra)vel(?!op)|speed|geschwind|vitesse|速|omega)"
 """What a speed is called; `level` and `travel` are none."""
 _LOAD = "force|torque|wrench|effort"
-_RATE_OR_LOAD = re.compile(rf"{_SPEED}|{_LOAD}|acc", re.IGNORECASE)
 _NO_POSITION = re.compile(
     rf"{_SPEED}|{_LOAD}|accel|jerk|tau|current|temperature|cartesian|tcp|pose"
     r"|delta|δ|∆|increment|relative|residual|derivative|beschleun|moment|couple|力矩|扭矩|トルク"
@@ -75,13 +70,12 @@ _TOOL = (
     r"grip|jaw|finger|width|claw|opening|suction|robotiq|wsg|greifer|pince|夹爪|夹具|vacuum|valve"
     r"|magnet|trigger|pump|knuckle|thumb|pinch|tong|drive joint|tool d[io]\b"
 )
-"""Words of a gripper or another tool, in `words`: `drive_joint` is the xArm's gripper."""
+"""Words of a gripper or another tool, in `_words`: `drive_joint` is the xArm's gripper."""
 _OF_TOOL = re.compile(rf"{_TOOL}|\bhand( \d+)?$")
 _OF_COORDINATE = re.compile(r"(?<!\b[qr] )\bd?[xyz]( \d+| delta)?$|world vector")
-_ATTITUDE = rf"{ATTITUDE}|euler|axis angle"
-_OF_ATTITUDE = re.compile(rf"{_ATTITUDE}|\brot|\bangle")
-_IN_SPACE = rf"\b([dvr]?[xyz]|q[wxyz])\b|{_ATTITUDE}|\b(rot\w*|pose) (\w+ )*\d|\bd?({_ANGLES})\b"
-"""What a coordinate or an attitude is called, in `words`; a tool's one angle is its opening."""
+_OF_ATTITUDE = re.compile(rf"{ATTITUDE}|\brot|\bangle")
+_IN_SPACE = rf"\b([dvr]?[xyz]|q[wxyz])\b|{ATTITUDE}|\b(rot\w*|pose) (\w+ )*\d|\bd?({_ANGLES})\b"
+"""What a coordinate or an attitude is called, in `_words`; a tool's one angle is its opening."""
 _OF_POSE = re.compile(rf"{_IN_SPACE}|\brot|\bpose\b|\bd?angle\b")
 
 _TURN = rf"{CIRCLES}|pitch|rotation|angle|winkel"
@@ -107,7 +101,7 @@ _BY_NAME = (
     (r"(rot ?vec|axis ?angle) \d$", Kind.ROTATION),
     (r"rot(ation)? ?6 ?d\b", Kind.MATRIX),
 )
-"""Kinds by what the name says in `words`, unless it is of a tool; the first counts."""
+"""Kinds by what the name says in `_words`, unless it is of a tool; the first counts."""
 _BY_WORD = (
     (rf"\b({_ALWAYS})s?\b", Kind.ANGLE),
     (rf"{_TOOL}|{_LOAD}|pressure|voltage|temperature", Kind.TOOL),
@@ -134,21 +128,17 @@ _PARTS_OF_POSE = {
 }
 """A whole pose that is numbered, by its size: `actual_TCP_pose_0` to `actual_TCP_pose_5`. Three are
 a place only where they are called so: `eef_pos_0` to `eef_pos_2`."""
-_OPENING = re.compile(
-    r"(.*[^a-z])?(gripper|jaw|claw|finger)s?([ _./-]*(width|pos(ition)?|q(pos)?|opening|state|value"
-    r"|joint\d*))*",
-    re.IGNORECASE,
+_OPENING = (
+    r"\b(gripper|jaw|claw|finger)s?"
+    r"( ?(width|pos(ition)?|q(pos)?|opening|state|value|joint( \d+)?))*$"
 )
 """Names of a gripper's opening: the only one, `gripper_width`, is the plan's `gripper`."""
-_COMMANDED = re.compile(
-    r"(^|[^a-z])(cmd|command(ed)?|actions?|target|des(ired)?|ref(erence)?|goal|set(point)?|leader"
-    r"|soll|(?<=q_)d)($|[^a-z])",
-    re.IGNORECASE,
+_COMMANDED = (
+    r"\b(cmd|command(ed)?|actions?|target|des(ired)?|ref(erence)?|goal|set(point)?|leader|soll"
+    r"|(?<=q )d)\b"
 )
-_MEASURED = re.compile(
-    r"(^|[^a-z])(act(ual)?|meas(ured)?|real|state|curr(ent)?|ist|obs(ervation)?|feedback|follower)"
-    r"($|[^a-z])",
-    re.IGNORECASE,
+_MEASURED = (
+    r"\b(act(ual)?|meas(ured)?|real|state|curr(ent)?|ist|obs(ervation)?|feedback|follower)\b"
 )
 """Words of what was commanded, and of what was measured."""
 
@@ -176,7 +166,7 @@ def kinds(names: Sequence[str]) -> tuple[Kind, ...]:
     return tuple(found)
 
 
-def words(name: str) -> str:
+def _words(name: str) -> str:
     """Return the words of a name in lower case, with blanks between: `joint 1 delta x`."""
     apart = re.sub("(?<=[a-z])(?=[A-Z])", " ", re.sub("[Δ∆δ]", " delta ", name))
     return " ".join(re.findall(r"[^\W\d_]+|\d+", apart.lower()))
@@ -184,7 +174,7 @@ def words(name: str) -> str:
 
 def is_increment(name: str) -> bool:
     """Whether a name says by how much a pose moves on in a frame: `dx`, `joint1_delta`."""
-    return _INCREMENT.search(words(name)) is not None
+    return _INCREMENT.search(_words(name)) is not None
 
 
 def increments(names: Sequence[str], units: Sequence[str]) -> tuple[int, ...]:
@@ -202,28 +192,23 @@ def _rates_beside(names: Sequence[str]) -> dict[str, str]:
 
 def is_of_tool(name: str) -> bool:
     """Whether a name is of a gripper, another tool or a hand: `jaw_x`, `suction`, `panda_hand`."""
-    return _OF_TOOL.search(words(name)) is not None
+    return _OF_TOOL.search(_words(name)) is not None
 
 
 def is_tool_state(name: str) -> bool:
     """Whether a number is right wherever its tool is: `jaw_angle`, `magnet`, but not `jaw_x`."""
-    return is_of_tool(name) and not re.search(_IN_SPACE, words(name))
+    return is_of_tool(name) and not re.search(_IN_SPACE, _words(name))
 
 
 def is_of_pose(name: str) -> bool:
     """Whether a name says anything of a pose: a coordinate, an angle of an attitude, a speed."""
-    return _OF_POSE.search(words(name)) is not None
+    return _OF_POSE.search(_words(name)) is not None
 
 
 def is_coordinate(name: str) -> bool:
     """Whether a name says a coordinate, or a displacement along one: `tool_dx`, not `angle_x`."""
-    called = words(name)
+    called = _words(name)
     return bool(_OF_COORDINATE.search(called)) and not _OF_ATTITUDE.search(called)
-
-
-def is_rate_or_load(name: str) -> bool:
-    """Whether a name says a speed, an acceleration, a force or a torque."""
-    return _RATE_OR_LOAD.search(name) is not None
 
 
 def says_no_position(name: str) -> bool:
@@ -234,9 +219,9 @@ def says_no_position(name: str) -> bool:
 
 def zero_at_rest(names: Sequence[str], units: Sequence[str | None]) -> list[int]:
     """Return the columns that are 0 at rest: increments, and speeds by their name or their unit."""
-    known, speeds = [unit or "1" for unit in units], (Kind.VELOCITY, Kind.TURN_RATE)
+    known = [unit or "1" for unit in units]
     summed, each = increments(names, known), enumerate(zip(known, kinds(names), strict=True))
-    return [i for i, (u, kind) in each if i in summed or kind in speeds or is_rate(u)]
+    return [i for i, (u, kind) in each if i in summed or kind in RATES or is_rate(u)]
 
 
 def one_for_all(
@@ -260,7 +245,7 @@ def _by_word(name: str) -> Kind:
     if is_increment(name) and is_coordinate(name):
         return Kind.LENGTH
     table = _BY_WORD if is_tool_state(name) else (*_BY_NAME, *_BY_WORD)
-    called = words(name)
+    called = _words(name)
     return next((kind for pattern, kind in table if re.search(pattern, called)), Kind.UNKNOWN)
 
 
@@ -305,15 +290,11 @@ def _are_matrix(_: str, parts: set[str]) -> bool:
 
 def is_opening(name: str) -> bool:
     """Whether a name is of how far a gripper is open: `gripper`, `robot0_gripper_qpos`."""
-    return _OPENING.fullmatch(name) is not None
+    return re.search(_OPENING, _words(name)) is not None
 
 
 def measured_of(stems: Sequence[str]) -> str | None:
     """Return the one of several readings of a motion that was measured; None if none says so."""
-    for left in (
-        [stem for stem in stems if not _COMMANDED.search(stem)],
-        [stem for stem in stems if _MEASURED.search(stem)],
-    ):
-        if len(left) == 1:
-            return left[0]
-    return None
+    plain = [stem for stem in stems if not re.search(_COMMANDED, _words(stem))]
+    measured = [stem for stem in stems if re.search(_MEASURED, _words(stem))]
+    return next((left[0] for left in (plain, measured) if len(left) == 1), None)

@@ -30,7 +30,7 @@ _OF_A_LIMB = re.compile(
 what an arm holds, are."""
 _WHOLE_CIRCLE = re.compile(rf"(^|[^a-z])({CIRCLES})($|[^a-z])", re.IGNORECASE)
 _QUATERNION = re.compile(r"(?P<stem>.*?)(?P<part>(?<![a-z])q[._]?[xyzw]|[._ /]?[xyzw])", re.I)
-ATTITUDE = "quat|orient|attitude"
+ATTITUDE = "quat|orient|attitude|euler|axis[ _]?angle"
 """Words of attitudes."""
 _OF_ATTITUDE = re.compile(rf"{ATTITUDE}|rot|(^|[^a-z])q$", re.IGNORECASE)
 _VECTOR = re.compile(r"(?P<stem>.*?)(?P<part>(?<![a-z])r[._]?[xyz]|[._ /]?[xyz])", re.IGNORECASE)

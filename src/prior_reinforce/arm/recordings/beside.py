@@ -17,7 +17,7 @@ from prior_reinforce.arm.recordings.naming import vectors
 from prior_reinforce.arm.recordings.recording import Beside, Positions, Recording
 from prior_reinforce.arm.recordings.time_finder import Times, is_clock, says_time, tells_time
 from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, Ambiguity, say_names, split_unit
-from prior_reinforce.plans.channels import is_rate_or_load, measured_of, says_no_position
+from prior_reinforce.plans.channels import RATES, Kind, kinds, measured_of, says_no_position
 from prior_reinforce.plans.signals import held_channels
 from prior_reinforce.plans.whole_turns import TURN
 
@@ -35,8 +35,8 @@ MASK = re.compile(
     r"((is|frame|attention|episode)_)?(pad|padded|padding|valid|masks?|(pad|padding|valid)_mask)"
 )
 _OF_BASE = re.compile(r"(^|[^a-z])(base|platform|odom(etry)?|rover|agv)([^a-z]|$)", re.IGNORECASE)
-_NOT_WHERE = re.compile("twist|joint", re.IGNORECASE)
-"""What moves below the arm, by its name, and what but rates and loads is not where that is."""
+_NOT_WHERE = re.compile("acc|twist|joint", re.IGNORECASE)
+"""What moves below the arm, by its name, and what but speeds and sensors is not where that is."""
 _SAME, _SHIFTS = 0.3, 21
 """Part of its spread by which a reading may differ from another, and delays that are tried, up to a
 fifth of the recording either way. Ours: a command differs by what a controller lags behind."""
@@ -158,7 +158,8 @@ def sides(name: str) -> set[str]:
 
 def is_of_base(name: str) -> bool:
     """Whether a name says where what carries the arm stands, which no joint tells."""
-    return bool(_OF_BASE.search(name)) and not (_NOT_WHERE.search(name) or is_rate_or_load(name))
+    is_where = not _NOT_WHERE.search(name) and kinds([name])[0] not in (*RATES, Kind.TOOL)
+    return is_where and _OF_BASE.search(name) is not None
 
 
 def may_move(name: str, width: int = 1) -> bool:

@@ -22,14 +22,7 @@ from prior_reinforce.arm.recordings.recording import Recording, or_leave_out
 from prior_reinforce.arm.recordings.takes import in_one_unit, odd_takes
 from prior_reinforce.arm.recordings.units import Ambiguity, conversion, say_names, split_unit
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
-from prior_reinforce.plans.channels import (
-    Kind,
-    increments,
-    kinds,
-    measured_of,
-    one_for_all,
-    says_no_position,
-)
+from prior_reinforce.plans.channels import Kind, kinds, measured_of, one_for_all, says_no_position
 from prior_reinforce.plans.whole_turns import TURN
 from prior_reinforce.wording import listed
 
@@ -174,13 +167,12 @@ def _refuse_places(
     joints: Sequence[str], names: Sequence[str], plan_units: Sequence[str] | None
 ) -> None:
     """ConfigurationError if places or velocities are to be a plan's joints: `--joints x y z`."""
-    wanted, units = kinds(names), plan_units or [""] * len(names)
-    moved = increments(names, units)
-    no_joint = {n for i, n in enumerate(names) if wanted[i].is_pose or i in moved}
+    units, no_joint = plan_units or [""] * len(names), {n for n in names if says_no_position(n)}
+    no_joint |= {n for n, kind in zip(names, kinds(names), strict=True) if kind.is_pose}
     each = zip(joints, names, kinds(joints), units, strict=True)
     turning = [(j, n, kind) for j, n, kind, unit in each if unit in TURN]
     places = [(j, n) for j, n, kind in turning if kind is Kind.PLACE]
-    rates = [(j, n) for j, n, _ in turning if j != n and says_no_position(j) and n not in no_joint]
+    rates = [(j, n) for j, n, _ in turning if says_no_position(j) and n not in no_joint]
     for wrong, are in ((places, "are a place"), (rates, "look like velocities, torques or else")):
         if wrong:
             recorded, called = zip(*wrong, strict=True)

@@ -279,10 +279,7 @@ def is_set_on(shift: Times, period: float) -> np.ndarray:
 
 
 def is_set_back(times: Stamps, positions: Float[np.ndarray, "T D"], least: float = 0.0) -> bool:
-    """Whether a clock was set back: in the order of its times, channels go further than in a row.
-
-    A range below `least` is no motion.
-    """
+    """Whether a clock was set back: in its order, channels (of a range `least`) go further."""
     ranges = np.fmax.reduce(positions) - np.fmin.reduce(positions)
     in_order = positions[np.argsort(times, kind="stable")]
     ways = [np.nansum(np.abs(np.diff(each, axis=0)), axis=0) for each in (in_order, positions)]

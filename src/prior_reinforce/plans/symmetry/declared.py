@@ -247,14 +247,10 @@ def _stays(form: PlanFormat, name: str) -> bool:
 
 def _places(form: PlanFormat) -> list[int]:
     """Columns of a length, or whose name says a coordinate, as units may have been guessed."""
-    turned = {name for group in (*form.attitudes, *attitudes(form.names)) for name in group}
-    turned |= {name for group in euler_angles(form.names, form.units) for name in group}
-    turned |= {n for n, unit in zip(form.names, form.units, strict=True) if is_force(unit)}
-    return [
-        i
-        for i, (name, unit) in enumerate(zip(form.names, form.units, strict=True))
-        if kind_of(unit) == "length" or (name not in turned and is_coordinate(name))
-    ]
+    turned = (*form.attitudes, *attitudes(form.names), *euler_angles(form.names, form.units))
+    said = {n for n in form.names if is_coordinate(n)}.difference(*turned)
+    each = enumerate(zip(form.names, form.units, strict=True))
+    return [i for i, (n, u) in each if kind_of(u) == "length" or (n in said and not is_force(u))]
 
 
 def _refuse_rates(form: PlanFormat, moved: Iterable[int], rates: Collection[int]) -> None:
