@@ -37,7 +37,8 @@ def patterns(units: tuple[str, ...]) -> tuple[re.Pattern[str], ...]:
         rf"(?:{PLUS_MINUS}\s*(?P<sd>{NUMBER})\s*(?P<sd_unit>{unit})\s*)?)?"
         r"(?:to the )?(?P<word>[a-z]+)"
     )
-    word_first = rf"(?:to the )?([a-z]+)\s+(?:by\s+)?((?:{NUMBER})\s*(?:{unit}))(?:\s+|$)"
+    # Tried where a word begins only, or a text of 100,000 letters would take minutes.
+    word_first = rf"(?<![a-z])(?:to the )?([a-z]+)\s+(?:by\s+)?((?:{NUMBER})\s*(?:{unit}))(?:\s+|$)"
     place = rf"(?P<number>[+-]?(?:{NUMBER}))\s*(?P<unit>{unit})(?:\s*[,;]\s*|\s+|$)"
     return tuple(re.compile(each, re.IGNORECASE) for each in (term, word_first, place))
 

@@ -32,7 +32,7 @@ _IN_WORDS = {
     **{re.compile(rf"\b{word}\b"): str(n) for n, word in enumerate(_NUMBERS, start=1)},
 }
 """Numbers that are said."""
-_FEET = re.compile(r"(\d+(?:\.\d+)?)\s*(?:ft|feet|foot)\b")
+_FEET = re.compile(r"(?<!\d)(\d+(?:\.\d+)?)\s*(?:ft|feet|foot)\b")
 """Read here only: in the names of recorded channels, `left_foot` and `wrist_ft` are no units."""
 
 
