@@ -8,6 +8,7 @@ in one line.
 from __future__ import annotations
 
 import ctypes
+import os
 import random
 import re
 import resource
@@ -117,6 +118,9 @@ def _start(
     program = subprocess.Popen(
         [sys.executable, "-c", PROGRAM, *args],
         cwd=here,
+        # Or a disk that is full would leave half of a module's bytecode, and every later program
+        # that imports it would fail.
+        env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
