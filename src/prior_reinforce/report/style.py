@@ -41,6 +41,7 @@ _RC: Any = {  # matplotlib releases differ in how they type this
     "font.family": "DejaVu Sans",  # comes with matplotlib, so pictures look alike everywhere
     "font.size": 10.5,
     "axes.unicode_minus": True,
+    "axes.titley": 1.0,  # at the frame, or ticks are measured thrice to see whether they reach it
     "text.color": INK,
     "text.parse_math": False,  # a title may hold dollar signs
     "text.usetex": False,  # whatever a matplotlibrc of the folder wants run

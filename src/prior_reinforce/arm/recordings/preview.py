@@ -145,7 +145,8 @@ class Preview:
         width, height = 3.4 * _COLUMNS, 2.6 * rows + 0.5
         figure = Figure(figsize=(width, height), dpi=110)
         colours = [colormaps["tab10"](i % 10) for i in range(demos.n)]
-        with rc_context({"text.parse_math": False, "text.usetex": False}):  # names hold $
+        plain: Any = {"text.parse_math": False, "text.usetex": False}  # names hold $
+        with rc_context(plain | {"axes.titley": 1.0}):  # no ticks stand where titles do
             axes = figure.subplots(rows, _COLUMNS, squeeze=False).ravel()
             # All panels are alike, so their margins are known; measuring them took half the time.
             figure.subplots_adjust(
