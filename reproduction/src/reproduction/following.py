@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from jaxtyping import Float
 from scipy.signal import cont2discrete, lfilter, lfiltic
@@ -21,8 +23,16 @@ def follow(path: Float[np.ndarray, "H D"], dt: float, bandwidth: float) -> Float
 
     The filter's bandwidth is in [Hz].
     """
-    w = 2 * np.pi * bandwidth
-    numerator, denominator, _ = cont2discrete(([w * w], [1.0, 2 * w, w * w]), dt, method="bilinear")
-    numerator = numerator.ravel()
+    numerator, denominator = _low_pass(dt, bandwidth)
     rest = [lfiltic(numerator, denominator, [x] * 2, [x] * 2) for x in path[0]]
     return lfilter(numerator, denominator, path, axis=0, zi=np.column_stack(rest))[0]
+
+
+@lru_cache  # to find it takes twice as long as to apply it
+def _low_pass(
+    dt: float, bandwidth: float
+) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
+    """Numerator and denominator of the filter of `follow`; not to be written to."""
+    w = 2 * np.pi * bandwidth
+    numerator, denominator, _ = cont2discrete(([w * w], [1.0, 2 * w, w * w]), dt, method="bilinear")
+    return numerator.ravel(), denominator
