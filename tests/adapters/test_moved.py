@@ -97,9 +97,44 @@ def test_how_far_a_scaling_carries_is_learned_from_a_goal_or_two(exponent, seen)
     counts = [arm.trials(goal, seen=seen) for goal in GOALS]
     assert counts[0] <= (3 if seen is None else 4)
     assert max(counts[3:]) <= (1 if seen is None else 2)
-    (gain, _), _ = arm.adapter._trials.belief.gain(0)
+    aims = np.array([[1.0, 0.05], [1.02, 0.05]])
+    ends, chart = aims + arm.adapter.displacement(aims), arm.shown.symmetry.chart
+    gain = np.diff(chart.to(ends)[:, 0]) / np.diff(chart.to(aims)[:, 0])
     assert gain == pytest.approx(exponent, abs=0.1)
     assert arm.adapter.symmetry_odds["as stated"] > 0.95
+
+
+THROWS = np.array(
+    [[0.98, 0.24], [0.92, -0.24], [0.93, -0.03], [1.09, 0.03], [1.1, -0.25], [1.2, 0.11]]
+)
+
+
+def test_mixed_demonstrations_that_are_all_off_by_the_same_tell_it_at_once():
+    """On another day: where each was believed to be off by itself, a throw beside hardly told."""
+    arm, goal = Arm(gain=np.eye(2), off=(-0.05, 0.0), shown=demonstrations(THROWS)), [1.1, 0.0]
+    arm.throw(np.array(goal), by_eye)
+    condition = arm.adapter.propose(np.array(goal))
+    expected = arm.adapter.expect(condition, goal, TOLERANCE)
+    assert expected.p_hit > 0.3, expected
+    assert arm.trials(np.array(goal), seen=by_eye) <= 2
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_landing_that_bends_between_mixed_demonstrations_is_learned_as_fast_as_without(sign):
+    """Where little was taken to lie between demonstrations, aims beside the goal were repeated."""
+    distances, bearings = np.array([0.85, 0.95, 1.06, 1.18, 1.31]), [-0.2, 0.15, 0.0, -0.1, 0.2]
+    outcomes = distances[:, None] * np.column_stack([np.cos(bearings), np.sin(bearings)])
+    arm = Arm(shown=demonstrations(outcomes, turn_and_scale(TurnJoint(), scale=Learned())))
+    chart = arm.shown.symmetry.chart
+
+    def lands(condition):
+        distance, bearing = chart.to(condition)
+        bend = np.sin(np.pi * np.interp(distance, np.log(distances), np.arange(5)))
+        return chart.back(np.array([distance + sign * 0.06 * bend, bearing]))
+
+    arm.lands = lands
+    counts = [arm.trials(np.array(goal)) for goal in ([1.0, 0.1], [1.1, -0.1], [1.2, 0.05])]
+    assert max(counts) <= 5
 
 
 def test_what_works_the_other_way_is_found_and_said():

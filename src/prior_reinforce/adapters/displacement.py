@@ -180,9 +180,14 @@ class DisplacementPrior:
         return self._asked[key]
 
     def _matern(self, a: Float[np.ndarray, "p k"], b: Points) -> Float[np.ndarray, "p n"]:
-        square = 5.0 * _squared(a, b) / self.config.generator_reach**2
-        root = np.sqrt(square)
-        return np.asarray((1.0 + root + square / 3.0) * np.exp(-root))
+        return matern(a, b, self.config.generator_reach)
+
+
+def matern(a: Float[np.ndarray, "p k"], b: Points, reach: float) -> Float[np.ndarray, "p n"]:
+    """Return Matern's kernel of order 5/2 of the distances from a to b."""
+    square = 5.0 * _squared(a, b) / reach**2
+    root = np.sqrt(square)
+    return np.asarray((1.0 + root + square / 3.0) * np.exp(-root))
 
 
 def rbf(a: Float[np.ndarray, "p k"], b: Points, reach: float) -> Float[np.ndarray, "p n"]:

@@ -8,7 +8,7 @@ with independent Gaussian terms:
 
     G    of mean and sd as the symmetry states: the identity where it is exact
     b    what is off by the same everywhere, as on another day; b_i what is off of demonstration i,
-         which counts v_i, its label included
+         which counts v_i: its label, and an execution's noise
     f    what no power law says, the farther the more; the same for all that an exact part moves
     F    what lies between demonstrations that are mixed
     s    a shift of everything since some trial, which nobody announced, or somebody did
@@ -37,13 +37,13 @@ from prior_reinforce.adapters.base import State
 from prior_reinforce.adapters.change_points import Change, announced, changes_of
 from prior_reinforce.adapters.expectation_propagation import Posterior, Readings, infer
 from prior_reinforce.adapters.memory import Memory, Places
-from prior_reinforce.adapters.moved_prior import NONE, Model, MovedPrior
+from prior_reinforce.adapters.moved_prior import Model, MovedPrior
 from prior_reinforce.adapters.p_hit import Targets, standard_normal, weighed_hits
 from prior_reinforce.arrays import Point, Points
 from prior_reinforce.plans.motions import Demonstrations
 
-_LEAST_GAIN, _GREATEST_GAIN = 0.3, 4.0
-"""What G is taken to be at least and at most along what is not exact (ours)."""
+_LEAST_GAIN = 0.3
+"""What G is taken to be at least along what is not exact (ours)."""
 _SHIFT = 0.2
 """Sd of a shift, in outcomes per unit of the chart: of the distance to the axis (ours)."""
 _ANOTHER_DAY = 3.0
@@ -65,6 +65,8 @@ changed but lately, and so many at most (ours)."""
 _STEPS, _LONGEST, _ARRIVED, _DAMPING = 12, 0.5, 1e-5, 1e-3
 """Newton's method for the aim: steps, the longest in each component and the last one, in units of
 the chart, and Levenberg's damping (ours)."""
+_NUDGE = 1e-3
+"""By how much an aim is changed for a difference quotient, in the chart (ours)."""
 _DRAWS = 1024
 """For the probability of a hit, under each hypothesis (ours)."""
 _IMPROBABLE = 0.01
@@ -329,47 +331,35 @@ class MovedBelief:
         each = [self.covariance(h, one, one)[0, :, 0] for one in single]
         return np.array(each).reshape(len(at.mean), self.k, self.k)
 
-    def gain(self, h: int) -> Float[np.ndarray, "k k"]:
-        """Expected G."""
-        model, left = self.model(h), self.prior.left
-        w = self.prior.moved(self.memory.conditions)
-        of_gain, of_trials = np.split(self._posterior.weights[h, 0], [len(left)])
-        of_trials = of_trials.reshape(len(w), self.k)
-        told = np.einsum("nc,ncj,nl->jl", of_trials, self.hypotheses[h].jacobian, w) * model.sd**2
-        told[left, left] += of_gain * np.diag(model.sd)[left] ** 2
-        return np.asarray(model.mean + told)
-
     def aim(self, goal: Point, number: int, farthest: Point) -> Point:
         """Return the aim that is expected to reach a goal, under the most probable hypothesis.
+
+        Newton's method, by difference quotients; where it does not arrive, the nearest it came.
 
         Args:
             goal: In the outcomes' units.
             number: Of the trial.
             farthest: How far plans are moved at most, in each component of the chart.
         """
-        model, chart, left = self.model(0), self.symmetry.chart, self.prior.left
-        gain = self.gain(0)
-        if model.name != NONE:
-            sign = model.signs[left]
-            gain[left, left] = sign * np.clip(sign * gain[left, left], _LEAST_GAIN, _GREATEST_GAIN)
-        z = chart.to(goal)
+        chart, k, best = self.symmetry.chart, self.k, np.inf
+        z = nearest = chart.to(goal)
+        nudges = _NUDGE * np.concatenate([np.zeros((1, k)), np.eye(k), -np.eye(k)])
         for _ in range(_STEPS):
-            at = self.outcomes(0, Places(z[None], np.array([number]), goal[None]))
-            slope, w = gain.copy(), self.prior.moved(z[None])[0]
-            if self.prior.anchors.mixed:
-                within = left[np.abs(w[left]) < 1e-9]
-                slope[:, within] = np.eye(self.k)[:, within]
-            elif np.count_nonzero(self.prior.base(z[None])[1]) > 1:
-                slope += (np.eye(self.k) - slope) @ self.prior.anchors.slope(z)
-            off = np.linalg.solve(at.jacobian[0], at.mean[0] - goal)
-            step = slope.T @ np.linalg.solve(slope @ slope.T + _DAMPING * np.eye(self.k), off)
+            numbers, goals = np.full(len(nudges), number), np.tile(goal, (len(nudges), 1))
+            at = self.outcomes(0, Places(z + nudges, numbers, goals))
+            into = np.linalg.inv(at.jacobian[0])
+            off = into @ (at.mean[0] - goal)
+            if np.abs(off).max() < best:
+                best, nearest = np.abs(off).max(), z
+            slope = into @ (at.mean[1 : k + 1] - at.mean[k + 1 :]).T / (2.0 * _NUDGE)
+            step = slope.T @ np.linalg.solve(slope @ slope.T + _DAMPING * np.eye(k), off)
             new = z - np.clip(step, -_LONGEST, _LONGEST)
             base = self.prior.base(new[None])[0][0]
             new = base + np.clip(new - base, -farthest, farthest)
             moved, z = np.abs(new - z).max(), new
             if moved < _ARRIVED:
-                break
-        return np.asarray(z)
+                return np.asarray(z)
+        return np.asarray(nearest)
 
     def _prune(self, number: int) -> None:
         """Keep what is probable, and what may yet become so."""

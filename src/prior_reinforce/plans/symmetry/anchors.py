@@ -22,8 +22,6 @@ _EVENLY = 0.2
 """Where a clock releases and two demonstrations are equally near an aim to this part, both are
 moved to it, and mixed (ours): else outcomes would jump from one to the other, and what lies between
 not be reached. Only there are motions as recorded at the same time."""
-_NUDGE = 1e-4
-"""By how much an aim is changed for a difference quotient, in the chart (ours)."""
 
 
 class Anchors:
@@ -80,12 +78,6 @@ class Anchors:
         base = weights @ self.z
         base[:, self.left] = within
         return base, weights
-
-    def slope(self, aim: Point) -> Float[np.ndarray, "k k"]:
-        """Return how z_base changes with the aim: d z_base / d z, by a difference quotient."""
-        nudged = aim + _NUDGE * np.concatenate([np.eye(len(aim)), -np.eye(len(aim))])
-        above, below = np.split(self.base(nudged)[0], 2)
-        return np.asarray((above - below).T / (2.0 * _NUDGE))
 
     def moves(self, aim: Point) -> tuple[Points, Point]:
         """Return by how much each demonstration is moved where a plan for an aim is made of it.
