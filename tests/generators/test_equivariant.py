@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from prior_reinforce.adapters.bayesian import BayesianAdapter
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.generators import load_generator, make_generator
 from prior_reinforce.generators.equivariant import Equivariant, rested
@@ -18,6 +19,7 @@ from prior_reinforce.plans.symmetry import (
     shift,
     turn_and_scale,
 )
+from prior_reinforce.session.session import Session
 from prior_reinforce.simulation.tasks import make_task
 from prior_reinforce.testing import synthetic_demonstrations
 
@@ -160,6 +162,10 @@ def test_auto_finds_the_turn_that_throws_show(tmp_path):
     for choice in ("auto,symmetry=none", "interpolation,symmetry=use"):
         other = make_generator(choice).fit(shown, seed=0)
         assert not any("bearing" in remark for remark in other.remarks)
+        assert other.shown(shown) is shown
+    assert loaded.shown(shown).symmetry == made.shown(shown).symmetry is not None
+    session = Session(made, BayesianAdapter(), shown, [1.0, 0.05], 0.015)
+    assert session.informed_adapter().symmetry_odds["as stated"] > 0.8  # the adapter knows of it
 
 
 def test_the_switch_gives_what_is_learned_from_demonstrations_alone(throws):

@@ -110,6 +110,13 @@ class Generator(ABC):
         """
         return self._generate(as_conditions(conditions, self._fitted_to()))
 
+    def shown(self, demonstrations: Demonstrations) -> Demonstrations:
+        """Return what it was fitted to with the symmetry by which it moves plans, found or stated.
+
+        An adapter starts with these, so that it knows how plans are made.
+        """
+        return demonstrations
+
     def check_demonstrations(self, demonstrations: Demonstrations) -> None:
         """Do nothing if it can learn from these.
 

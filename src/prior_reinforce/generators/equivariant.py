@@ -58,6 +58,11 @@ class Equivariant(Wrapper):
         super().__init__(generator)
         self._finds = finds
 
+    def shown(self, demonstrations: Demonstrations) -> Demonstrations:
+        """Return them with the symmetry that was found, or theirs; see `Generator.shown`."""
+        found = demonstrations.symmetry is None and self._anchors is not None
+        return demonstrations.with_symmetry(self._anchors.symmetry) if found else demonstrations
+
     def check_demonstrations(self, demonstrations: Demonstrations) -> None:
         """Refuse too few to tell what a turn leaves; see `Generator.check_demonstrations`."""
         symmetry = demonstrations.symmetry

@@ -85,15 +85,16 @@ class InUse:
         another session have used the adapter.
         """
         adapter, told = self.adapter, list(_told(state, self.names[0]))
-        keys = [adapter.first_key(self.demonstrations)]
+        shown = self.generator.shown(self.demonstrations)
+        keys = [adapter.first_key(shown)]
         for what, arguments in told:
             keys.append(next_key(keys[-1], what, *arguments))
         if adapter.key not in keys:
             kept = log.kept_adapter()
             if kept is not None and kept.key in keys:
-                adapter.resume(self.demonstrations, kept)
+                adapter.resume(shown, kept)
             else:
-                adapter.start(self.demonstrations)
+                adapter.start(shown)
         for what, arguments in told[keys.index(adapter.key) :]:
             getattr(adapter, what)(*arguments)
         return adapter
