@@ -451,3 +451,30 @@ def test_a_continuous_joints_ends_are_said_to_be_passed_over(tmp_path, ends, sai
     arm = read_urdf(write_urdf(tmp_path / "a.urdf", joints))
     assert ("passed over: lower and upper of joint b" in arm.source) == said
     assert arm.upper[1] == 4 * np.pi
+
+
+# Half angles: z turned by -0.2 after x by 0.3.
+SIN_X, COS_X, SIN_Z, COS_Z = np.sin(0.15), np.cos(0.15), np.sin(-0.1), np.cos(-0.1)
+X_Y_Z_W = (SIN_X * COS_Z, SIN_X * SIN_Z, COS_X * SIN_Z, COS_X * COS_Z)
+QUATERNION = 'rpy="0.3 0 -0.2"', f'quat_xyzw="{" ".join(map(str, X_Y_Z_W))}"'
+
+
+def test_a_quaternion_turns_as_roll_pitch_and_yaw_do(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(Urdf("a", [*arm(["a", "b"]), fixed("t", "tool0")]).text())
+    by_angles, text = read_urdf(path), path.read_text()
+    assert QUATERNION[0] in text
+    path.write_text(text.replace(*QUATERNION))
+    q = np.random.default_rng(0).uniform(-2, 2, (5, 2))
+    arm_ = read_urdf(path)
+    seen = tool_tip(arm_.chain, q, TIP)
+    np.testing.assert_allclose(seen, tool_tip(by_angles.chain, q, TIP), atol=1e-9)
+    assert "quat_xyzw" not in arm_.source
+    for wrong, says in [
+        (f"{QUATERNION[0]} {QUATERNION[1]}", "rpy and quat_xyzw.*take one out"),
+        ('quat_xyzw="0 0 0 2"', "length 1, and it has 2"),
+        ('quat_xyzw="0 0 1"', "give 4 finite numbers"),
+    ]:
+        path.write_text(text.replace(QUATERNION[0], wrong))
+        with pytest.raises(ConfigurationError, match=says):
+            read_urdf(path)

@@ -382,6 +382,15 @@ REFUSED = [
         says="joint p follows another (<mimic> of joint2)",
     ),
     Urdf("MuJoCo's format", arm(SIX), change=("robot", "mujoco"), says="begins with <mujoco>"),
+    *[
+        Urdf(
+            f"an unknown attribute of <{part}>",
+            arm(SIX),
+            change=(f"<{part} ", f'<{part} frame="world" '),
+            says=f"joint1 has an unknown frame in <{part}>; take it out",
+        )
+        for part in ("origin", "axis", "limit")
+    ],
     Urdf("a gripper alone", fingers("base_link", "revolute"), says="--tip"),
     Urdf(
         "a base that is not on the way",

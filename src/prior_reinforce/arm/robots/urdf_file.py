@@ -3,8 +3,8 @@
 Ours rather than a library's: yourdfpy, urdfdom and MuJoCo pass over what they do not understand and
 take defaults for what is missing; with one character gone, an arm has another axis or fewer joints.
 Here, XML that is not well formed is an error, and so is a joint of the arm that lacks something or
-has a word that is nearly one of URDF's (wiki.ros.org/urdf/XML). What else is unknown, and whatever
-stands in other joints, cannot move the flange: it is passed over, and named.
+has a word that is nearly one of URDF's (wiki.ros.org/urdf/XML), or an unknown one in what places
+it. What else is unknown, and whatever stands in other joints, is passed over, and named.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from prior_reinforce.arm.robots.limits import ENDLESS
 from prior_reinforce.errors import ConfigurationError, FileFormatError
@@ -35,13 +36,17 @@ RATES = {"acceleration": 1e3, "jerk": 5e5}
 _ATTRIBUTES = {
     "parent": {"link"},
     "child": {"link"},
-    "origin": {"xyz", "rpy"},
+    "origin": {"xyz", "rpy", "quat_xyzw"},
     "axis": {"xyz"},
     "limit": {"lower", "upper", "effort", "velocity", *RATES},
     "mimic": {"joint", "multiplier", "offset"},
     "safety_controller": {"soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"},
 }
 """What a joint may say that matters to its motion."""
+_PLACING = ("origin", "axis", "limit")
+"""What says where a joint is and how it moves: an unknown attribute may say that otherwise."""
+_PASSED_OVER = ("deceleration",)
+"""Attributes of newer URDFs that no rule here reads."""
 _ELSEWHERE = ("dynamics", "calibration")
 """What else URDF lets it say."""
 _NEARLY = 0.74
@@ -135,6 +140,11 @@ class Joint:
             words = _ATTRIBUTES.get(tag, ())
             for key in attributes.keys() - words:
                 self._refuse_slip(key, words - attributes.keys() if words else (), f" in <{tag}>")
+                if tag in _PLACING and key not in _PASSED_OVER and "}" not in key:
+                    raise self.error(
+                        f"has an unknown {key} in <{tag}>; take it out, or say it in "
+                        f"{', '.join(sorted(words))}"
+                    )
             if tag not in (*_ATTRIBUTES, *_ELSEWHERE):
                 self._refuse_slip(
                     f"<{tag}>", [f"<{known}>" for known in _ATTRIBUTES.keys() - found]
@@ -225,6 +235,8 @@ class Joint:
         pose = np.eye(4)
         roll, pitch, yaw = self.vector("origin", "rpy")
         pose[:3, :3], pose[:3, 3] = rotation(roll, pitch, yaw), self.vector("origin", "xyz")
+        if "quat_xyzw" in self.parts.get("origin", {}):
+            pose[:3, :3] = self._turned()
         if np.abs(pose[:3, 3]).max() > _FARTHEST or max(map(abs, (roll, pitch, yaw))) > 7:
             raise self.error(
                 f"has an <origin> beyond {_FARTHEST:g} m or a turn; URDF is in m and rad: convert "
@@ -235,6 +247,18 @@ class Joint:
         elif position and self.type == "prismatic":
             pose[:3, 3] += pose[:3, :3] @ self.axis() * position
         return pose
+
+    def _turned(self) -> np.ndarray:
+        """Attitude of its `quat_xyzw`, 3 x 3 (urdfdom since 2025: x, y, z, w)."""
+        if "rpy" in self.parts["origin"]:
+            raise self.error("has rpy and quat_xyzw in its <origin>; take one out")
+        quaternion = self.vector("origin", "quat_xyzw", 4)
+        if abs(math.hypot(*quaternion) - 1) > _LENGTH_OF_AXIS:
+            raise self.error(
+                f"needs a quat_xyzw of length 1, and it has {math.hypot(*quaternion):.3g}; write "
+                "x y z w of the turn"
+            )
+        return np.asarray(Rotation.from_quat(quaternion).as_matrix())
 
     def axis(self) -> tuple[float, float, float]:
         """About which it turns."""
