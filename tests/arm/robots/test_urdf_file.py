@@ -381,7 +381,19 @@ REFUSED = [
         {"tip": "p_link"},
         says="joint p follows another (<mimic> of joint2)",
     ),
-    Urdf("MuJoCo's format", arm(SIX), change=("robot", "mujoco"), says="begins with <mujoco>"),
+    Urdf(
+        "MuJoCo's format",
+        arm(SIX),
+        change=("robot", "mujoco"),
+        says="begins with <mujoco>, not <robot>: MuJoCo's format is not read; give the URDF",
+    ),
+    Urdf("SDF", arm(SIX), change=("robot", "sdf"), says="SDF is not read; give the URDF"),
+    Urdf(
+        "an argument of xacro",
+        arm(SIX),
+        change=("joint3", "$(arg prefix)joint3"),
+        says="xacro arm.urdf.xacro",
+    ),
     *[
         Urdf(
             f"an unknown attribute of <{part}>",

@@ -66,6 +66,9 @@ _BESIDE = 0.01
 """By how much a joint may be held beyond its range, [rad] or [m] (ours): two written digits."""
 _WEB_PAGE = (b"<!doctype html", b"<html")
 """Beginnings of what a browser saves in the place of a file, in lower case."""
+_OTHER_FORMATS = {"mujoco": "MuJoCo's format", "sdf": "SDF"}
+"""By the element with which a file begins."""
+_ASK = "give the URDF of the arm, as its maker's ROS package has it"
 _XACRO = "make a URDF of its xacro: xacro arm.urdf.xacro > arm.urdf"
 
 
@@ -78,7 +81,7 @@ def read_joints(path: Path) -> tuple[str, list[Joint], list[str], dict[str, str]
     if not path.is_file():
         raise FileFormatError(f"no URDF at {path}; give the path of a .urdf file")
     if path.name.lower().endswith(".sdf"):
-        raise FileFormatError(f"{path}: SDF is not read; give the URDF of the arm")
+        raise FileFormatError(f"{path}: SDF is not read; {_ASK}")
     if path.name.endswith(".xacro"):
         raise FileFormatError(f"{path} is a xacro; make a URDF of it: xacro {path} > arm.urdf")
     try:
@@ -89,7 +92,7 @@ def read_joints(path: Path) -> tuple[str, list[Joint], list[str], dict[str, str]
             if file.read(_LONGEST_NAME).lstrip().lower().startswith(_WEB_PAGE):
                 raise FileFormatError(f"{path} is a web page; download the file that it shows")
         root = ElementTree.parse(path, ElementTree.XMLParser(target=_Builder())).getroot()
-        joints = _joints_of(root)
+        joints = _joints_of(root, path)
         links = _links_of(root, joints)
         return root.get("name") or path.stem, joints, links, _meshes_of(root, joints)
     except FileFormatError:
@@ -184,7 +187,7 @@ class Joint:
         values = [float(word) for word in words if _NUMBER.fullmatch(word)]
         if not (len(values) == len(words) == n and np.all(np.isfinite(values))):
             wants = "a finite number" if n == 1 else f"{n} finite numbers"
-            wants += f", or {_XACRO}" * ("${" in text)
+            wants += f", or {_XACRO}" * _is_of_xacro(text)
             raise self.error(f'has <{part} {key}="{text[:80]}">; give {wants}')
         return values
 
@@ -316,9 +319,13 @@ def _name(element: ElementTree.Element) -> str:
     name = element.get("name", "")
     if not (name and name.isprintable() and len(name) <= _LONGEST_NAME):
         raise ValueError(f"a <{element.tag}> has no name, or one that is none: {name[:80]!r}")
-    if "${" in name:
+    if _is_of_xacro(name):
         raise ValueError(f"{name[:80]!r} is left of a xacro: {_XACRO}")
     return name
+
+
+def _is_of_xacro(text: str) -> bool:
+    return "${" in text or "$(" in text
 
 
 def _refuse_repeated(what: str, names: Sequence[str]) -> None:
@@ -327,11 +334,16 @@ def _refuse_repeated(what: str, names: Sequence[str]) -> None:
             raise ValueError(f"two {what.format(name)}")
 
 
-def _joints_of(robot: ElementTree.Element) -> list[Joint]:
+def _joints_of(robot: ElementTree.Element, path: Path) -> list[Joint]:
     """Every joint, with its type and its ends."""
     space = "".join(robot.tag.rpartition("}")[:2])
     if robot.tag.removeprefix(space) != "robot":
-        raise ValueError(f"it begins with <{robot.tag[:80]}>, not <robot>")
+        problem = f"it begins with <{robot.tag[:80]}>, not <robot>"
+        if robot.tag in _OTHER_FORMATS:
+            raise FileFormatError(
+                f"{path}: {problem}: {_OTHER_FORMATS[robot.tag]} is not read; {_ASK}"
+            )
+        raise ValueError(problem)
     if any("xacro}" in element.tag for element in robot.iter()):
         raise ValueError(f"it has elements of xacro: {_XACRO}")
     found: list[Joint] = []
