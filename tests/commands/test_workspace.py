@@ -175,6 +175,22 @@ def test_a_person_at_the_terminal_is_asked_which_link_is_the_flange(run, tmp_pat
         assert workspace.manifest.robot.joint_names == ("a", "b", "wrist")
 
 
+def test_where_no_flange_is_proposed_one_has_to_be_said(run, tmp_path, monkeypatch):
+    of = {"of": "base_link"}
+    left, right = ([J(f"{s}_a", f"{s}1", **of), J(f"{s}_b", f"{s}2")] for s in ("l", "r"))
+    (tmp_path / "arm.urdf").write_text(Urdf("two", [*left, *right]).text())
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    answers = iter(["", " ", "r2", "none"])
+    monkeypatch.setattr(
+        "prior_reinforce.commands.workspace.answer_to", lambda question: next(answers)
+    )
+    status, out, err = run("new", tmp_path / "w", "--robot", tmp_path / "arm.urdf")
+    assert status == 0, err
+    assert out.count("ends in l2, r2") == 3
+    with Workspace(tmp_path / "w") as workspace:
+        assert workspace.manifest.robot.joint_names == ("r_a", "r_b")
+
+
 @pytest.mark.parametrize("robot", ["none", "panda"])
 def test_where_no_motion_is_turned_no_box_is_wanted_anyway(run, tmp_path, robot):
     status, _, err = run("new", tmp_path / "w", "--robot", robot, "--no-box")

@@ -98,10 +98,19 @@ class New(NewWorkspace):
         try:
             self.described(Path(self.robot))
         except UnclearFlangeError as error:
-            print(error)
-            tip = answer_to(f"link that is the flange [{error.proposed}]: ").strip()
-            return replace(self, tip=tip or error.proposed or None)
-        return self
+            unclear = error
+        else:
+            return self
+        print(unclear)
+
+        def read(said: str) -> str:
+            if not (tip := said.strip() or unclear.proposed):
+                raise unclear
+            return tip
+
+        proposed = f" [{unclear.proposed}]" * bool(unclear.proposed)
+        question = f"link that is the flange{proposed}: "
+        return replace(self, tip=until_read(partial(answer_to, question), read))
 
     def _asked(self) -> New:
         """The same with what a person at a terminal says of the object, and of the box."""

@@ -367,7 +367,7 @@ REFUSED = [
             *side("right"),
             fixed("rt", "right_tool0"),
         ],
-        says="which end in tool0 and right_tool0; say whose",
+        says="ends in tool0, right_tool0; say which",
     ),
     Urdf(
         "a palletizer, whose tool is kept level",

@@ -1,25 +1,29 @@
-"""Limits and kinematics of any serial arm from its URDF: which of its joints are the arm's."""
+"""Limits and kinematics of any serial arm from its URDF."""
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from prior_reinforce.arm.robots.flange import (
+    MOST_JOINTS,
+    find_flange,
+    fixed_behind,
+    is_conventional,
+    joints_to,
+    moved_behind,
+)
 from prior_reinforce.arm.robots.limits import ENDLESS, PerJoint, RobotLimits
 from prior_reinforce.arm.robots.urdf_file import LARGEST, TURNING, TYPES, Joint, read_joints
-from prior_reinforce.errors import ConfigurationError, FileFormatError, UnclearFlangeError
+from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.plans.kinematics import UPRIGHT, Chain, Pose, rotation
 from prior_reinforce.wording import listed
 
-_MOST_NAMED, _MOST_JOINTS = 40, 100
-"""Links in a message, and turning joints of one arm (ours)."""
-_TIPS = ("tool0", "flange", "link_eef")
-"""Links that are the flange by ROS's conventions (REP 199) and UFACTORY's; the first there is."""
-_PREFIXED_TIPS = tuple(f"_{tip}" for tip in _TIPS)
+_MOST_NAMED = 40
+"""Links in a message (ours)."""
 _ROUNDING = 1e-9
 """What is left of a level link's z beside the root's by rounding, [1] (ours)."""
 _SAME_AXES = 0.01
@@ -27,10 +31,6 @@ _SAME_AXES = 0.01
 _FLAT = 0.5
 """Least level part of a link's x that is a heading, [1]. Ours: within 60 degrees of level; of a
 mount that is calibrated to a degree it then turns by 2 degrees at most."""
-_JAW = re.compile("grip|jaw|finger|claw|knuckle|thumb|pinch|tong", re.IGNORECASE)
-_JAW_MESH = re.compile("jaw|finger|claw|thumb|pinch", re.IGNORECASE)
-"""Of a mesh's file name, which may be the only one that a CAD program's export leaves telling."""
-_OF_AN_ARM = re.compile("wrist|elbow|shoulder|arm|roll|pitch|yaw|rotat", re.IGNORECASE)
 _LONGEST_LINK = 3.0
 """Between two joints of an arm, in [m]. Ours: the largest on the market have 1.7."""
 
@@ -47,8 +47,8 @@ def read_urdf(
 
     Args:
         path: Of a URDF; meshes that it names are not read.
-        tip: The link that is the flange; None takes `tool0`, `flange` or `link_eef`, else the link
-            that the last turning joint of the longest chain moves.
+        tip: The link that is the flange; None takes `tool0`, `flange` or `link_eef` behind any
+            prefix, else the link that the last turning joint moves, where one arm alone ends so.
         base: The link at which the base frame stands, for instance above a lift; None takes the
             root. Its z is the root's, and its x the link's, laid flat; see `_upright`.
         hold: Joints that stand still, and where, in [rad] and [m].
@@ -59,7 +59,7 @@ def read_urdf(
     Raises:
         FileFormatError: No URDF, a damaged one, or one without such a chain.
         ConfigurationError: No such link, or a joint without limits.
-        UnclearFlangeError: A gripper's joint may be one of the arm's, or there are several arms.
+        UnclearFlangeError: A joint may be the arm's or a tool's, or there are several arms.
     """
     name, joints, links, meshes = read_joints(path)
     moving, hold, unsaid = {joint.child: joint for joint in joints}, dict(hold or {}), tip is None
@@ -72,8 +72,9 @@ def read_urdf(
         for link in {tip, base} - {None, *links}:
             few = ", ".join(links[:_MOST_NAMED])
             raise ConfigurationError(f"it has no link {link!r}; it has {few}")
-        tip = _flange(links, moving, base, hold, meshes) if tip is None else tip
-        chain = _path(tip, moving, base)
+        if tip is None:
+            tip = find_flange(links, moving, links[0] if base is None else base, hold, meshes)
+        chain = joints_to(tip, moving, base)
         if base is not None and (not chain or chain[0].parent != base):
             raise ConfigurationError(f"link {base} is not on the way to {tip}; say another --base")
         turning = [joint for joint in chain if joint.name not in hold and joint.type in TURNING]
@@ -81,7 +82,7 @@ def read_urdf(
         velocity, acceleration, jerk = (_largest(key, turning) for key in LARGEST)
         assert velocity is not None  # it is needed
         lower, upper = np.array([joint.range() for joint in turning]).T
-        upright = _upright(_path(chain[0].parent, moving), hold)
+        upright = _upright(joints_to(chain[0].parent, moving), hold)
         kinematics = _chain(chain, hold, upright)
     except (ConfigurationError, FileFormatError) as error:
         error.args = (f"{path}: {error}",)
@@ -90,9 +91,11 @@ def read_urdf(
     source = f"{path.name}, from {chain[0].parent}{f' (z as in {links[0]})' * tilted} to {tip}"
     source += "".join(f", {name} held at {position:g}" for name, position in hold.items())
     source += ", soft limits too" * any("safety_controller" in joint.parts for joint in turning)
-    # A convention's link is the flange, and what is behind it a tool.
-    behind = _fixed_behind(tip, links, moving) if unsaid and not tip.endswith(_TIPS) else []
+    # A convention's link is the flange, and what is fixed behind it a tool.
+    behind = fixed_behind(tip, links, moving, hold) if unsaid and not is_conventional(tip) else []
     source += f"; fixed behind it: {listed(behind)} (--tip NAME takes one)" * bool(behind)
+    tools = moved_behind(turning[-1].child, links, moving, hold) if unsaid else []
+    source += f"; moved behind it: {listed(tools, most=3)}" * bool(tools)
     capped = [j for j in turning if j.type == "continuous" and 0 < np.ptp(j.ends()) < 2 * ENDLESS]
     over = [f"lower and upper of joint {joint.name}, which is continuous" for joint in capped]
     over += [f"{what} of joint {joint.name}" for joint in joints for what in joint.unknown]
@@ -128,7 +131,7 @@ def bases_on_axis(
     arm, moving = read_urdf(path, tip, base, hold), {joint.child: joint for joint in joints}
     first = next(joint for joint in joints if joint.name == arm.joint_names[0])
     found = list[str]()
-    for joint in _path(first.parent, moving, base):
+    for joint in joints_to(first.parent, moving, base):
         x, y, _, *turned = _first_origin(read_urdf(path, tip, joint.child, hold))
         same = np.allclose(turned, _first_origin(arm)[3:], atol=_SAME_AXES)
         if same and math.hypot(x, y) <= within:
@@ -139,100 +142,6 @@ def bases_on_axis(
 def _first_origin(arm: RobotLimits) -> Pose:
     assert arm.chain is not None  # a URDF has one
     return arm.chain.origins[0]
-
-
-def _path(link: str, moving: Mapping[str, Joint], base: str | None = None) -> list[Joint]:
-    """The joints from the base, or the root, to a link."""
-    found = list[Joint]()
-    while link in moving and link != base:
-        found.append(moving[link])
-        link = found[-1].parent
-    return found[::-1]
-
-
-def _flange(
-    links: Sequence[str],
-    moving: Mapping[str, Joint],
-    base: str | None,
-    hold: Mapping[str, float],
-    meshes: Mapping[str, str],
-) -> str:
-    """The link that `read_urdf` takes for the flange.
-
-    Raises:
-        UnclearFlangeError: Several may be it, or a gripper's joint turns as the arm's own do.
-    """
-    plain = next((tip for tip in _TIPS if tip in links), None)
-    if plain is not None:
-        own = {joint.name for joint in _path(plain, moving, base) if joint.free}
-        for other in (link for link in links if link.endswith(_PREFIXED_TIPS)):
-            turned = {joint.name for joint in _path(other, moving, base) if joint.free}
-            if turned and own.isdisjoint(turned):
-                raise UnclearFlangeError(
-                    f"it has several arms, which end in {plain} and {other}; say whose is meant "
-                    "with --tip"
-                )
-        return plain
-    start = links[0] if base is None else base
-    turns, of_jaw, jaws = {start: 0}, {start: False}, list[str]()
-    """How many of the arm's joints turn up to a link; whether a joint called jaw is among them."""
-    ends = list[str]()
-    for link in links:
-        joint = moving.get(link)
-        if joint is None or joint.parent not in turns or link == start:
-            continue
-        free = joint.free and joint.name not in hold
-        called = _JAW.search(joint.name) and not _OF_AN_ARM.search(joint.name)
-        looks = _JAW_MESH.search(meshes.get(link, ""))
-        jaws += [link] if free and (called or looks) else []
-        of_jaw[link] = of_jaw[joint.parent] or link in jaws[-1:]
-        turns[link] = turns[joint.parent] + (free and not of_jaw[link])
-        ends += [link] if free and not of_jaw[link] else []
-    most = max(turns.values())
-    ends = [link for link in ends if turns[link] == most]
-    named = dict[str, str]()
-    """The flange by convention, by the prefix of its arm."""
-    for tip in _PREFIXED_TIPS:
-        for link in turns:
-            if turns[link] == most and link.endswith(tip) and not of_jaw[link]:
-                named.setdefault(link.removesuffix(tip), link)
-    if len(named) == 1:
-        return next(iter(named.values()))
-    last = [joint for joint in _path(ends[0], moving, start) if joint.free] if ends else []
-    if len(ends) == 1:
-        followed = {joint.mimics for joint in moving.values()}
-        jaw = _JAW.search(last[-1].child) and not _OF_AN_ARM.search(last[-1].name)
-        if len(last) > 1 and (jaw or last[-1].name in followed):
-            jaws = [last.pop().child]
-        elif not any(moving[ends[0]] in _path(link, moving, start) for link in jaws[:_MOST_NAMED]):
-            return ends[0]
-    else:  # fingers share most of their joints, two arms few
-        paths = [{*_path(link, moving, start)} for link in ends[:_MOST_NAMED]]
-        last = [joint for joint in last if all(joint in path for path in paths)]
-        jaws = ends
-        if 2 * len(last) < most or not last:
-            ends = [*named.values()] if len(named) == len(ends) else ends
-            raise UnclearFlangeError(
-                f"it ends in {', '.join(ends[:_MOST_NAMED]) or 'no turning joint'}; say which link "
-                "is the flange with --tip"
-            )
-    proposed = last[-1].child
-    fixed = ", ".join(_fixed_behind(proposed, links, moving)[:_MOST_NAMED])
-    also = f", or one that is fixed to it: {fixed}" * bool(fixed)
-    raise UnclearFlangeError(
-        f"joint {moving[jaws[0]].name} looks like a gripper's; say which link is the flange with "
-        f"--tip: {proposed}, which the arm's last joint {last[-1].name} moves{also}",
-        proposed,
-    )
-
-
-def _fixed_behind(link: str, links: Sequence[str], moving: Mapping[str, Joint]) -> list[str]:
-    """Links that are fixed to a link, and to these, from it outwards."""
-    rigid = {link: None}
-    for other in links:
-        if other in moving and moving[other].type == "fixed" and moving[other].parent in rigid:
-            rigid[other] = None
-    return [*rigid][1:]
 
 
 def _refuse_other(
@@ -248,10 +157,10 @@ def _refuse_other(
                 "a --tip before it, or, where the arm goes on behind it, --robot none: no limits "
                 "are then checked"
             )
-    if len(turning) > _MOST_JOINTS:
+    if len(turning) > MOST_JOINTS:
         raise FileFormatError(
             f"{len(turning)} joints turn between the base and {tip}, and an arm has at most "
-            f"{_MOST_JOINTS}; say --base or --tip"
+            f"{MOST_JOINTS}; say --base or --tip"
         )
     other = [j for j in chain if j.type in TYPES[3:] and j.name not in hold]
     if other:
