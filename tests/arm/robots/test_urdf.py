@@ -453,6 +453,63 @@ def test_a_continuous_joints_ends_are_said_to_be_passed_over(tmp_path, ends, sai
     assert arm.upper[1] == 4 * np.pi
 
 
+STAGES = [
+    J("lower", "stage", "prismatic", low=0.0, high=0.35),
+    J(
+        "upper",
+        "top",
+        "prismatic",
+        low=-0.1,
+        high=0.6,
+        more='<mimic joint="lower" multiplier="1.5" offset="-0.05"/>',
+    ),
+    *arm(["a", "b", "c"]),
+]
+
+
+def test_what_follows_a_held_joint_follows_it(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(Urdf("lift", STAGES).text())
+    with pytest.raises(FileFormatError, match=r"--base top .*, or --hold lower=0 if") as refused:
+        read_urdf(path)
+    assert "upper=" not in str(refused.value)
+    q = np.random.default_rng(0).uniform(-2, 2, (5, 3))
+    given = Urdf("lift", STAGES, tip="c_link")
+    for hold in ({"lower": 0.2}, {"lower": 0.2, "upper": 0.25}):
+        lifted = read_urdf(path, hold=hold)
+        stands = {"lower": 0.2, "upper": 0.25}
+        assert lifted.held == pytest.approx(stands)
+        for row in q:
+            expected = given.place(dict(zip("abc", row, strict=True)) | stands, "base_link")
+            np.testing.assert_allclose(tool_tip(lifted.chain, row), expected, atol=1e-9)
+    for hold, remedy in [
+        ({"lower": 0.2, "upper": 0.4}, "to 0.25; take it out"),
+        ({"upper": 0.4}, "hold lower where both do"),
+    ]:
+        with pytest.raises(ConfigurationError, match=f"upper follows lower .*{remedy}"):
+            read_urdf(path, hold=hold)
+    path.write_text(path.read_text().replace('"1.5"', '"4"'))
+    with pytest.raises(ConfigurationError, match=r"to 1.15, and its range is -0.1 to 0.6"):
+        read_urdf(path, hold={"lower": 0.3})
+
+
+def test_a_base_that_drives_and_turns_is_none_of_the_arm(tmp_path):
+    drive = [
+        J("base_x", "bx", "prismatic", rpy=(0.0, 0.0, 0.0)),
+        J("base_y", "by", "prismatic", rpy=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0)),
+        J("base_theta", "base", "continuous", rpy=(0.0, 0.0, 0.0)),
+    ]
+    path = tmp_path / "arm.urdf"
+    joints = [f"joint{i}" for i in range(1, 7)]
+    path.write_text(Urdf("mobile", [*drive, *arm(joints)], root="world").text())
+    remedy = "--base base for .*, or --hold base_x=0 base_y=0 base_theta=0 if"
+    with pytest.raises(FileFormatError, match=remedy):
+        read_urdf(path)
+    assert read_urdf(path, base="base").joint_names == tuple(joints)
+    held = read_urdf(path, hold=dict.fromkeys(("base_x", "base_y", "base_theta"), 0.0))
+    assert held.joint_names == tuple(joints)
+
+
 # Half angles: z turned by -0.2 after x by 0.3.
 SIN_X, COS_X, SIN_Z, COS_Z = np.sin(0.15), np.cos(0.15), np.sin(-0.1), np.cos(-0.1)
 X_Y_Z_W = (SIN_X * COS_Z, SIN_X * SIN_Z, COS_X * SIN_Z, COS_X * COS_Z)

@@ -10,6 +10,7 @@ import numpy as np
 
 from prior_reinforce.arm.robots.flange import (
     MOST_JOINTS,
+    arms_own,
     find_flange,
     fixed_behind,
     is_conventional,
@@ -51,7 +52,7 @@ def read_urdf(
             prefix, else the link that the last turning joint moves, where one arm alone ends so.
         base: The link at which the base frame stands, for instance above a lift; None takes the
             root. Its z is the root's, and its x the link's, laid flat; see `_upright`.
-        hold: Joints that stand still, and where, in [rad] and [m].
+        hold: Joints that stand still, and where, in [rad] and [m]; what follows one stands too.
 
     Returns:
         Its limits; of accelerations and jerks where the file states every joint's.
@@ -62,13 +63,9 @@ def read_urdf(
         UnclearFlangeError: A joint may be the arm's or a tool's, or there are several arms.
     """
     name, joints, links, meshes = read_joints(path)
-    moving, hold, unsaid = {joint.child: joint for joint in joints}, dict(hold or {}), tip is None
+    moving, said, unsaid = {joint.child: joint for joint in joints}, dict(hold or {}), tip is None
     try:
-        if unknown := hold.keys() - {joint.name for joint in joints}:
-            raise ConfigurationError(f"it has no joint {min(unknown)!r} to hold")
-        for joint in joints:
-            if joint.name in hold:
-                joint.check_held(hold[joint.name])
+        hold = _held(joints, said)
         for link in {tip, base} - {None, *links}:
             few = ", ".join(links[:_MOST_NAMED])
             raise ConfigurationError(f"it has no link {link!r}; it has {few}")
@@ -78,7 +75,7 @@ def read_urdf(
         if base is not None and (not chain or chain[0].parent != base):
             raise ConfigurationError(f"link {base} is not on the way to {tip}; say another --base")
         turning = [joint for joint in chain if joint.name not in hold and joint.type in TURNING]
-        _refuse_other(chain, turning, tip, hold)
+        _refuse_other(chain, turning, joints, tip, hold)
         velocity, acceleration, jerk = (_largest(key, turning) for key in LARGEST)
         assert velocity is not None  # it is needed
         lower, upper = np.array([joint.range() for joint in turning]).T
@@ -89,7 +86,7 @@ def read_urdf(
         raise
     tilted = bool(upright[2, 2] < math.cos(UPRIGHT))
     source = f"{path.name}, from {chain[0].parent}{f' (z as in {links[0]})' * tilted} to {tip}"
-    source += "".join(f", {name} held at {position:g}" for name, position in hold.items())
+    source += "".join(f", {name} held at {position:g}" for name, position in said.items())
     source += ", soft limits too" * any("safety_controller" in joint.parts for joint in turning)
     # A convention's link is the flange, and what is fixed behind it a tool.
     behind = fixed_behind(tip, links, moving, hold) if unsaid and not is_conventional(tip) else []
@@ -144,14 +141,37 @@ def _first_origin(arm: RobotLimits) -> Pose:
     return arm.chain.origins[0]
 
 
+def _held(joints: Sequence[Joint], hold: Mapping[str, float]) -> dict[str, float]:
+    """The joints that stand still, and where: those of `hold`, and what follows them (<mimic>).
+
+    Raises:
+        ConfigurationError: There is no such joint, or it cannot stand there.
+    """
+    if unknown := hold.keys() - {joint.name for joint in joints}:
+        raise ConfigurationError(f"it has no joint {min(unknown)!r} to hold")
+    held = {j.name: hold[j.name] for j in joints if j.name in hold and j.mimics is None}
+    while follow := [j for j in joints if j.mimics in held and j.name not in held]:
+        held |= {joint.name: joint.followed(held[joint.mimics or ""]) for joint in follow}
+    for joint in joints:
+        if joint.name in hold or joint.name in held:
+            joint.check_held(hold.get(joint.name), held.get(joint.name))
+    return held
+
+
 def _refuse_other(
-    chain: Sequence[Joint], turning: Sequence[Joint], tip: str, hold: Mapping[str, float]
+    chain: Sequence[Joint],
+    turning: Sequence[Joint],
+    joints: Sequence[Joint],
+    tip: str,
+    hold: Mapping[str, float],
 ) -> None:
     """Refuse a chain without turning joints, or with others that are not held."""
     if not turning:
         raise FileFormatError(f"no joint turns between the base and {tip}; say --tip")
-    for joint in turning:
-        if joint.mimics is not None:
+    other = [j for j in chain if j.type in TYPES[3:] and j.name not in hold]
+    arms = {joint.name for joint in turning}
+    for joint in [*turning, *other]:
+        if joint.mimics is not None and (joint.mimics in arms or joint in turning):
             raise joint.error(
                 f"follows another (<mimic> of {joint.mimics}), and so is no joint of its own; say "
                 "a --tip before it, or, where the arm goes on behind it, --robot none: no limits "
@@ -162,18 +182,30 @@ def _refuse_other(
             f"{len(turning)} joints turn between the base and {tip}, and an arm has at most "
             f"{MOST_JOINTS}; say --base or --tip"
         )
-    other = [j for j in chain if j.type in TYPES[3:] and j.name not in hold]
-    if other:
-        first, last = chain.index(other[0]), chain.index(other[-1])
-        before, behind = (any(j in turning for j in part) for part in (chain[:first], chain[last:]))
-        says = [f"--tip {other[0].parent} for what is before"] * before
-        # What carries the arm may stand still; an arm's own joints do not.
-        says += [f"--base {other[-1].child} for what is behind it"] * (behind and not before)
-        holds = "--hold " + " ".join(f"{j.name}={j.nearest(0.0):.4g}" for j in other)
-        raise FileFormatError(
-            f"{other[-1].name} is {other[-1].type}, and arms of turning joints are known only; say "
-            f"{', or '.join([*says, holds])} if it stands still"
-        )
+    if not other:
+        return
+    first, last = chain.index(other[0]), chain.index(other[-1])
+    before, behind = ([j for j in part if j in turning] for part in (chain[:first], chain[last:]))
+    says = [f"--tip {other[0].parent} for what is before"] * bool(before)
+    base = other[-1].child
+    still = [*other]
+    turn = behind[0] if len(other) > 1 and behind and not before else None
+    # x, y and a turn without end: a base that drives, which is none of the arm's.
+    if (
+        turn
+        and turn.type == "continuous"
+        and arms_own([j.name for j in behind[::-1]]) < len(behind)
+    ):
+        base, still = turn.child, [*other, turn]
+    # What carries the arm may stand still; an arm's own joints do not.
+    says += [f"--base {base} for what is behind it"] * (bool(behind) and not before)
+    led = {joint.name: joint for joint in joints}
+    leaders = {joint.mimics if joint.mimics in led else joint.name: None for joint in still}
+    holds = "--hold " + " ".join(f"{name}={led[name].nearest(0.0):.4g}" for name in leaders)
+    raise FileFormatError(
+        f"{other[-1].name} is {other[-1].type}, and arms of turning joints are known only; say "
+        f"{', or '.join([*says, holds])} if it stands still"
+    )
 
 
 def _largest(key: str, turning: Sequence[Joint]) -> PerJoint | None:

@@ -191,10 +191,36 @@ class Joint:
             raise self.error(f'has <{part} {key}="{text[:80]}">; give {wants}')
         return values
 
-    def check_held(self, position: float) -> None:
-        """Refuse a place, [rad] or [m], at which it cannot stand still."""
+    def followed(self, position: float) -> float:
+        """Return where it stands, [rad] or [m], while the joint that it follows is at a place."""
+        multiplier, offset = (self.number("mimic", key) for key in ("multiplier", "offset"))
+        return (1.0 if multiplier is None else multiplier) * position + (offset or 0.0)
+
+    def check_held(self, said: float | None, stands: float | None) -> None:
+        """Refuse a place, [rad] or [m], at which it cannot stand still.
+
+        Args:
+            said: What a person says of it, if anything.
+            stands: Where it is: what was said, or where what it follows takes it.
+        """
+        if stands is None:
+            raise self.error(
+                f"follows {self.mimics} (<mimic>), and does not stand still; hold {self.mimics} "
+                "where both do"
+            )
+        position = stands
         if self.mimics is not None:
-            raise self.error(f"follows {self.mimics} (<mimic>), and does not stand still")
+            if self.nearest(position) != position:
+                low, high = self.places()
+                raise self.error(
+                    f"follows {self.mimics} to {position:.4g}, and its range is {low:.4g} to "
+                    f"{high:.4g}; hold {self.mimics} elsewhere"
+                )
+            if said is not None and abs(said - position) > _BESIDE:
+                raise self.error(
+                    f"follows {self.mimics} to {position:.4g}; take it out of --hold, or say that"
+                )
+            return
         if self.type not in (*TURNING, "prismatic"):
             if position:
                 raise self.error(f"is {self.type}, and can be held at 0 alone")
