@@ -510,6 +510,13 @@ def test_a_base_that_drives_and_turns_is_none_of_the_arm(tmp_path):
     assert held.joint_names == tuple(joints)
 
 
+def test_a_flange_metres_behind_the_last_joint_is_in_another_unit(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(Urdf("a", [*arm(["a", "b"]), fixed("t", "tool0", xyz=(0, 0, 8.0))]).text())
+    with pytest.raises(ConfigurationError, match=r"flange is 8 m from the last joint.*--tip"):
+        read_urdf(path)
+
+
 # Half angles: z turned by -0.2 after x by 0.3.
 SIN_X, COS_X, SIN_Z, COS_Z = np.sin(0.15), np.cos(0.15), np.sin(-0.1), np.cos(-0.1)
 X_Y_Z_W = (SIN_X * COS_Z, SIN_X * SIN_Z, COS_X * SIN_Z, COS_X * COS_Z)

@@ -282,6 +282,11 @@ def _chain(joints: Sequence[Joint], hold: Mapping[str, float], upright: np.ndarr
             origins.append(_pose(since))
             axes.append(joint.axis())
             since = np.eye(4)
+    if np.linalg.norm(since[:3, 3]) > _LONGEST_LINK:
+        raise ConfigurationError(
+            f"the flange is {np.linalg.norm(since[:3, 3]):.3g} m from the last joint, and no arm "
+            "has such a link: say another --tip, or divide what is in cm or mm"
+        )
     return Chain(tuple(origins), tuple(axes), _pose(since))
 
 
