@@ -488,6 +488,11 @@ def test_what_follows_a_held_joint_follows_it(tmp_path):
     ]:
         with pytest.raises(ConfigurationError, match=f"upper follows lower .*{remedy}"):
             read_urdf(path, hold=hold)
+    third = J("third", "roof", "prismatic", low=0.0, high=0.6, more='<mimic joint="upper"/>')
+    path.write_text(Urdf("lift", [*STAGES[:2], third, *STAGES[2:]]).text())
+    with pytest.raises(FileFormatError, match=r"--base roof .*, or --hold lower=0 if"):
+        read_urdf(path)
+    assert read_urdf(path, hold={"lower": 0.2}).held["third"] == pytest.approx(0.25)
     path.write_text(path.read_text().replace('"1.5"', '"4"'))
     with pytest.raises(ConfigurationError, match=r"to 1.15, and its range is -0.1 to 0.6"):
         read_urdf(path, hold={"lower": 0.3})

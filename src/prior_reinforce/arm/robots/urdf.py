@@ -187,21 +187,18 @@ def _refuse_other(
     first, last = chain.index(other[0]), chain.index(other[-1])
     before, behind = ([j for j in part if j in turning] for part in (chain[:first], chain[last:]))
     says = [f"--tip {other[0].parent} for what is before"] * bool(before)
-    base = other[-1].child
-    still = [*other]
-    turn = behind[0] if len(other) > 1 and behind and not before else None
+    base, still = other[-1].child, [*other]
+    drives = len(other) > 1 and behind and not before and behind[0].type == "continuous"
     # x, y and a turn without end: a base that drives, which is none of the arm's.
-    if (
-        turn
-        and turn.type == "continuous"
-        and arms_own([j.name for j in behind[::-1]]) < len(behind)
-    ):
-        base, still = turn.child, [*other, turn]
+    if drives and arms_own([joint.name for joint in behind[::-1]]) < len(behind):
+        base, still = behind[0].child, [*other, behind[0]]
     # What carries the arm may stand still; an arm's own joints do not.
     says += [f"--base {base} for what is behind it"] * (bool(behind) and not before)
-    led = {joint.name: joint for joint in joints}
-    leaders = {joint.mimics if joint.mimics in led else joint.name: None for joint in still}
-    holds = "--hold " + " ".join(f"{name}={led[name].nearest(0.0):.4g}" for name in leaders)
+    named = {joint.name: joint for joint in joints}
+    for _ in other:  # what is followed may follow as well
+        still = [named.get(joint.mimics or "", joint) for joint in still]
+    leaders = dict.fromkeys(still)
+    holds = "--hold " + " ".join(f"{joint.name}={joint.nearest(0.0):.4g}" for joint in leaders)
     raise FileFormatError(
         f"{other[-1].name} is {other[-1].type}, and arms of turning joints are known only; say "
         f"{', or '.join([*says, holds])} if it stands still"
