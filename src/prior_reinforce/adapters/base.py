@@ -25,7 +25,7 @@ from prior_reinforce.files import open_npz
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import Reading
 
-_STATE = 3
+_STATE = 4
 """Version of what `state` gives, part of the key, so that states kept before are not resumed."""
 _Arrays = TypeVar("_Arrays")
 
