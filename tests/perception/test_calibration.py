@@ -69,7 +69,8 @@ def test_four_points_say_nothing_of_the_error():
     calibration = TableCalibration.fit(CORNERS, pixels)
     assert calibration.fit_error < 1e-9
     assert calibration.left_out_error is None
-    assert "one point more" in calibration.summary()
+    assert calibration.untested == 4
+    assert "4 points are not tested" in calibration.summary()
 
 
 @pytest.mark.parametrize(("made_at", "wanted_at"), [(0.0, 0.1), (0.1, 0.0), (0.03, 0.2)])
@@ -203,6 +204,33 @@ def test_a_corner_that_the_other_points_cannot_predict_does_not_count(beside):
     calibration = TableCalibration.fit(points, pixels)
     assert calibration.left_out_error == pytest.approx(off[4])
     assert calibration.sd < 0.004
+    assert calibration.untested == 4
+
+
+@pytest.mark.parametrize("wrong", [0, 30, 100])
+def test_points_that_the_others_do_not_test_are_counted_until_the_remedy_is_followed(
+    wrong, tmp_path
+):
+    """Of four corners and the middle, no residual shows a corner that is off along its diagonal."""
+
+    def clicked(points):
+        pixels = through_pinhole(at(points, 0.0))
+        diagonal = pixels[2] - pixels[0]
+        pixels[2] += wrong * diagonal / np.linalg.norm(diagonal)
+        return TableCalibration.fit(points, pixels)
+
+    low, high = CORNERS.min(axis=0), CORNERS.max(axis=0)
+    five = np.array([low, (low[0], high[1]), high, (high[0], low[1]), (low + high) / 2])
+    blind = clicked(five)
+    assert blind.fit_error < 1e-5
+    assert "calibrated to" not in blind.summary()
+    assert "add the middles of two opposite sides" in blind.summary()
+    blind.save(tmp_path / "table.json")
+    assert TableCalibration.load(tmp_path / "table.json").say_untested() == blind.say_untested()
+    middles = [(low[0], five[4, 1]), (high[0], five[4, 1])]
+    followed = clicked(np.vstack([five, middles]))
+    assert (followed.untested, followed.say_untested()) == (0, "")
+    assert (followed.sd > CAMERA_SD) == (wrong > 0)
 
 
 @pytest.mark.parametrize("aside", [0.01, 0.05, 0.2])

@@ -60,7 +60,8 @@ class Calibrate:
 
     points: Annotated[Path, tyro.conf.Positional]
     """CSV with columns x, y (table frame, in metres: forward, left) and u, v (in pixels: right,
-    down), four points at least, five to know how well it fits."""
+    down), four points at least; six, in the corners and in the middles of two opposite sides, to
+    know how well it fits."""
     height: float = 0.0
     """Height of the points above the table, in [m]."""
     picture: Path | None = None
@@ -109,7 +110,8 @@ class Calibrate:
             )
         _, others_off = left_out_errors(table_points, pixels)
         if calibration.sd > _COARSE:
-            # Without the point that is wrong the others agree, where they are enough to disagree.
+            # Without the point that is wrong the others agree, where they are enough to disagree;
+            # one that is not tested may be the wrong one.
             agree = others_off <= 2 * np.nan_to_num(others_off, nan=np.inf).min() + 0.001
             says = " or ".join(
                 f"{i + 1} ({x:g}, {y:g})"
@@ -118,7 +120,7 @@ class Calibrate:
             )
             if calibration.worst_sd > max(_COARSE, _BESIDE * calibration.fit_error):
                 remedy = " beside the points; give more, in all corners of the table"
-            elif 0 < agree.sum() <= np.isfinite(others_off).sum() / 2:
+            elif not calibration.untested and agree.sum() <= len(agree) / 2:
                 remedy = f"; without point {says} the others agree: measure and click it again"
             else:
                 remedy = "; give more points, in all corners; two may be exchanged, as two tags are"
@@ -193,11 +195,8 @@ class Look:
                 "then, both errors' signs are wrong: save both as PNG, and calibrate again"
             )
         here = calibration.in_picture((picture.shape[1], picture.shape[0]))
-        if here.left_out_error is None:
-            warn(
-                "the calibration's points are too few to tell how well it fits: "
-                f"+-{100 * here.sd:.1f} cm is without a wrong point; give one point more"
-            )
+        if untested := here.say_untested():
+            warn(f"of the calibration's points, {untested}, and calibrate again")
         if here is not calibration:
             warn(
                 "the picture has another size than that of the calibration, and is scaled to it; "

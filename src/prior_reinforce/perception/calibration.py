@@ -40,6 +40,7 @@ class _Saved(
         "worst_sd": "worst_sd_m",
         "clicked": "clicked_px",
         "exif": "exif_orientation",
+        "untested": "untested_points",
     },
 ):
     """What a file holds of a `TableCalibration`; its numbers are finite, as JSON's are."""
@@ -53,6 +54,7 @@ class _Saved(
     worst_sd: float = 0.0
     clicked: tuple[float, float, float, float] | None = None
     exif: int | None = None
+    untested: int = 0
 
 
 # Singular values of the design matrix below this share of the largest count as zero: points on
@@ -96,8 +98,8 @@ class TableCalibration:
     """Root mean square distance between the points and their pixels seen through H, in [m].
     Zero by construction where there were only four points."""
     left_out_error: float | None
-    """The same for each point seen through an H fitted to all others, in [m]: what to expect of
-    a point that was not clicked. None where the others tell no point, as of four."""
+    """The same for each point that is tested, seen through an H fitted to all others, in [m]: what
+    to expect of a point that was not clicked. None where no point is tested, as of four."""
     picture: tuple[int, int] | None = None
     """Width and height of the upright picture, in [px]; None where nobody said."""
     worst_sd: float = 0.0
@@ -107,6 +109,9 @@ class TableCalibration:
     """Box around the points' pixels: left, top, right, bottom; None where nobody said."""
     exif: int | None = None
     """EXIF orientation of the photograph in which points were clicked; None without one."""
+    untested: int = 0
+    """How many points are not tested, as the others leave open where they are: a wrong one of them
+    may not show. Zero where nobody said."""
 
     @property
     def sd(self) -> float:
@@ -179,14 +184,16 @@ class TableCalibration:
         homography = _direct_linear_transform(points, seen)
         fit_error = _rms(_map(np.linalg.inv(homography), seen) - points)
         misses, _ = left_out_errors(points, seen)
-        left_out = None if np.isnan(misses).all() else float(np.sqrt(np.nanmean(misses**2)))
+        tested = misses[~np.isnan(misses)]
+        left_out = float(np.sqrt(np.mean(tested**2))) if len(tested) else None
         # Of four points nothing is left over that would show the pixels' noise.
         n_free = max(2 * len(points) - 8, 1)
         residual = np.linalg.norm(_map(homography, points) - seen) / np.sqrt(n_free)
         per_pixel = _worst_sd_per_pixel(homography, points, picture)
         worst = per_pixel * float(max(_CLICK_SD, residual))
         clicked = *seen.min(axis=0).tolist(), *seen.max(axis=0).tolist()
-        return cls(homography, float(height), fit_error, left_out, picture, worst, clicked)
+        fitted = cls(homography, float(height), fit_error, left_out, picture, worst, clicked)
+        return replace(fitted, untested=len(points) - len(tested))
 
     def to_table(self, pixels: ArrayLike) -> Float[np.ndarray, "*n 2"]:
         """Map pixels, shape (..., 2), to points in the plane, in [m]."""
@@ -285,11 +292,20 @@ class TableCalibration:
     def summary(self) -> str:
         """One line for the operator, in centimetres."""
         beside = f"{100 * self.worst_sd:.2f} cm at worst in the square around them"
-        if self.left_out_error is None:
-            return f"calibrated, {beside}; one point more would tell how well"
-        return (
-            f"calibrated to {100 * self.left_out_error:.2f} cm (each point through the others), "
-            f"{beside}, plane {100 * self.height:.1f} cm above the table"
+        plane = f"plane {100 * self.height:.1f} cm above the table"
+        if untested := self.say_untested():
+            return f"calibrated, {beside}, {plane}; {untested}"
+        assert self.left_out_error is not None
+        left_out = f"{100 * self.left_out_error:.2f} cm (each point through the others)"
+        return f"calibrated to {left_out}, {beside}, {plane}"
+
+    def say_untested(self) -> str:
+        """How many points the others do not test, and what to do; empty where they test all."""
+        # Files of earlier versions say it of four points only.
+        n = self.untested or (4 if self.left_out_error is None else 0)
+        return bool(n) * (
+            f"{n} points are not tested by the others: one of them may be wrong; add the middles "
+            "of two opposite sides of the table"
         )
 
     def save(self, path: str | os.PathLike[str]) -> None:
