@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import shlex
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +13,8 @@ from PIL import Image, ImageDraw
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.cli import main
 from prior_reinforce.perception.calibration import TableCalibration
+from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.parsing import from_words
 from prior_reinforce.perception.camera import Camera
 from prior_reinforce.simulation.tasks import make_task
 from tests.arm.workspace.planar import demonstrations, manifest
@@ -103,10 +107,7 @@ def test_a_photograph_tells_the_error(table, capsys):
     with VisionServer() as server:
         assert look(folder, server.base_url) == 0
         said = capsys.readouterr().out
-        told = re.search(r"TRIAL ([-.\d]+)\+-\S+ ([-.\d]+)\+-", said)
-        assert told is not None
-        seen = np.array([float(told[1]), float(told[2])])
-        np.testing.assert_allclose(seen, truth, atol=0.006)
+        np.testing.assert_allclose(seen(said)[::2], truth, atol=0.006)
         assert (folder / "photo-seen.png").stat().st_size > 10_000
 
         # The goal that is set counts, 4 cm nearer than the hoop that is seen.
@@ -118,10 +119,7 @@ def test_a_photograph_tells_the_error(table, capsys):
         of_trial = ("--workspace", str(folder / "hoop"), "--trial", "1")
         assert look(folder, server.base_url, *of_trial) == 0
         said = capsys.readouterr()
-        told = re.search(r"hoop 1 ([-.\d]+)\+-\S+ ([-.\d]+)\+-", said.out)
-        assert told is not None
-        seen = np.array([float(told[1]), float(told[2])])
-        np.testing.assert_allclose(seen, truth + np.array([0.04, 0]), atol=0.006)
+        np.testing.assert_allclose(seen(said.out)[::2], truth + np.array([0.04, 0]), atol=0.006)
         assert re.search(r"the red hoop is seen [345]\.\d cm from the goal that is set", said.err)
         assert (folder / "hoop" / "pictures" / "trial-001-seen.png").stat().st_size > 10_000
 
@@ -423,8 +421,11 @@ def drawn_table(tmp_path, run):
 
 
 def seen(out):
-    told = re.search(r"tell \S+ \S+ ([-.\d]+)\+-(\S+) ([-.\d]+)\+-", out)
-    return [float(number) for number in told.groups()]
+    """What is printed to tell: x, its sd, y and its sd, in [m]."""
+    told = re.search(r'tell .* --error "(.*)"', out)
+    reading = from_words(told[1])
+    x, y, x_sd, y_sd = *reading.error_seen, *reading.sd
+    return [x, x_sd, y, y_sd]
 
 
 def test_a_picture_of_another_size_is_scaled_or_refused(drawn_table, capsys):
@@ -508,10 +509,18 @@ def test_four_points_tell_no_spread(drawn_table, capsys, run):
     assert "4 points are not tested by the others" in capsys.readouterr().err
 
 
-def trial_for(goal, folder):
+def trial_for(goal, folder, names=("x", "y"), units=("m", "m"), scale=1.0):
     """A workspace that waits for the outcome of its first trial for a goal."""
-    with Workspace.create(folder / "hoop", manifest()) as workspace:
-        workspace.import_demonstrations(demonstrations(), "made up")
+    form = {"outcome_names": str([*names]), "outcome_units": str([*units])}
+    form |= {"tolerance": 0.015 * scale}
+    made, order = demonstrations(), slice(None, None, 1 if names[0] == "x" else -1)
+    made = replace(
+        made,
+        outcomes_seen=scale * made.outcomes_seen[:, order],
+        outcome_format=OutcomeFormat((*names,), (*units,)),
+    )
+    with Workspace.create(folder / "hoop", manifest(**form)) as workspace:
+        workspace.import_demonstrations(made, "made up")
         workspace.learn("interpolation")
         workspace.set_goal(goal)
         workspace.session().ask()
@@ -551,9 +560,38 @@ def test_a_goal_that_is_seen_a_little_beside_makes_what_is_told_as_unsure(drawn_
         assert look(drawn_table, server.base_url, *of_trial) == 0
     said = capsys.readouterr()
     assert "4.0 cm from the goal that is set" in said.err
-    x, sd, y = seen(said.out)
-    np.testing.assert_allclose([x, y, sd], [0.09, 0.07, 0.04], atol=0.004)
-    assert said.out.rstrip().endswith("+-0.003")  # to the side it is seen where it is set
+    # To the side it is seen where it is set.
+    np.testing.assert_allclose(seen(said.out), [0.09, 0.04, 0.07, 0.003], atol=0.004)
+
+
+@pytest.mark.parametrize("of_trial", [True, False])
+@pytest.mark.parametrize(
+    ("names", "unit", "scale"),
+    [("xy", "cm", 100), ("xy", "in", 1 / 0.0254), ("yx", "m", 1), ("yx", "mm", 1000)],
+)
+def test_what_is_printed_is_read_in_the_units_and_order_of_the_workspace(
+    names, unit, scale, of_trial, drawn_table, capsys, run
+):
+    """A ball 5 cm long and 7 cm left is that in a workspace in centimetres, or of y and x."""
+    in_order = slice(None, None, 1 if names == "xy" else -1)
+    goal = scale * np.array([1.0, 0.05])[in_order]
+    where = trial_for(goal.tolist(), drawn_table, names, (unit, unit), scale)
+    with VisionServer() as server:
+        assert look(drawn_table, server.base_url, *(where if of_trial else ())) == 0
+    printed = capsys.readouterr().out.splitlines()[-1].partition("prior-reinforce ")[2]
+    told = printed.replace("FOLDER TRIAL", f"{drawn_table / 'hoop'} 1")
+    assert run(*shlex.split(told))[0] == 0
+    with Workspace(drawn_table / "hoop") as workspace:
+        error = workspace.state.trial(1).reading.error_seen
+    np.testing.assert_allclose(error / scale, np.array([0.05, 0.07])[in_order], atol=0.004)
+
+
+def test_a_workspace_of_other_outcomes_than_a_photograph_shows_is_named(drawn_table, capsys):
+    where = trial_for([1.0, 0.05], drawn_table, ("x", "z"))
+    assert look(drawn_table, "http://127.0.0.1:9/v1", *where) == 2
+    err = capsys.readouterr().err
+    assert "x [m], z [m]" in err
+    assert 'tell --error "_cm long, _cm high"' in err
 
 
 def cut_in_shape(path, times):
@@ -571,7 +609,7 @@ def test_a_picture_that_is_cut_in_the_same_shape_is_no_sure_reading(drawn_table,
         assert look(drawn_table, server.base_url) == 0
         said = capsys.readouterr()
         assert "if it was cut instead" in said.err
-        x, sd, y = seen(said.out)
+        x, sd, y, _ = seen(said.out)
         assert np.abs([x - 0.05, y - 0.07]).max() <= max(0.006, 1.5 * sd)
         assert look(drawn_table, server.base_url, *trial_for([1.0, 0.05], drawn_table)) == 1
     said = capsys.readouterr()
@@ -585,7 +623,7 @@ def test_an_object_that_the_border_cuts_is_told(drawn_table, capsys):
         assert look(drawn_table, server.base_url) == 0
     said = capsys.readouterr()
     assert "the orange ball is cut" in said.err
-    assert said.out.rstrip().endswith("+-0.015")
+    assert seen(said.out)[3] == pytest.approx(0.015, abs=0.001)
 
 
 @pytest.mark.parametrize(

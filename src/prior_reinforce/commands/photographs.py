@@ -23,8 +23,8 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.extras import check_installed
 from prior_reinforce.files import named_disk_errors, refuse_foreign, write
-from prior_reinforce.units import UNITS, looks_like
-from prior_reinforce.wording import to_words
+from prior_reinforce.units import UNITS, factor, looks_like
+from prior_reinforce.wording import WORDS, axes_of, to_words
 
 if TYPE_CHECKING:
     from prior_reinforce.perception.calibration import TableCalibration
@@ -226,9 +226,15 @@ class Look:
             error = reading.reached.place - goal
             sd = np.maximum(sd, here.sd_off(self._beside_goal(here, reading, goal, drawn)))
         print(f"seen: {to_words(error)}   boxes: {drawn}")
-        numbers = " ".join(f"{e:.4f}+-{s:.2g}" for e, s in zip(error, sd, strict=True))
-        told = "FOLDER TRIAL" if goal is None else f"{shlex.quote(str(folder.parent))} {self.trial}"
-        print(f"if the boxes are right: prior-reinforce tell {told} {numbers}")
+        # In words with their unit, which each workspace reads in its outcomes' units and order.
+        told = ", ".join(
+            f"{100 * abs(e):.2f}+-{100 * s:.2f} cm {positive if e >= 0 else negative}"
+            for e, s, (positive, negative) in zip(error, sd, WORDS[:2], strict=True)
+        )
+        of, right = f"{shlex.quote(str(folder.parent))} {self.trial}", "if the boxes are right"
+        if goal is None:
+            of, right = "FOLDER TRIAL", f"{right} and outcomes are x and y only"
+        print(f'{right}: prior-reinforce tell {of} --error "{told}"')
 
     def _beside_goal(
         self, here: TableCalibration, reading: PictureReading, goal: Point, drawn: Path
@@ -260,24 +266,26 @@ class Look:
         return beside
 
     def _of_trial(self) -> tuple[Point | None, Path, str]:
-        """The goal that the trial was for, where to keep what is seen, and its name there."""
+        """The goal (x, y) [m] of the trial, where to keep what is seen, and its name there."""
         if self.workspace is None and self.trial is None:
             return None, self.picture.parent, f"{self.picture.stem}-seen"
         from prior_reinforce.arm.workspace.manifest import workspace_around
+        from prior_reinforce.arm.workspace.text import tell_example
         from prior_reinforce.arm.workspace.workspace import Workspace
 
         folder = self.workspace or workspace_around(Path())
         if folder is None or self.trial is None:
             raise ConfigurationError("--workspace and --trial say together which trial it was")
         with Workspace(folder) as workspace:
-            state, units = workspace.state, workspace.manifest.outcome_format.units
-            if tuple(units) != ("m", "m"):
+            state, form = workspace.state, workspace.manifest.outcome_format
+            axes, metres = axes_of(form), [factor(unit, "m") for unit in form.as_listed().units]
+            if sorted(axes) != [0, 1] or None in metres:
                 raise ConfigurationError(
-                    f"a photograph from above shows two lengths, but outcomes are in {list(units)};"
-                    " leave --workspace out, and tell what you see"
+                    f"a photograph from above shows x and y, but outcomes are {form}; look at it "
+                    f"yourself, and tell {tell_example(workspace.manifest)}"
                 )
-            goal = state.goal_of(state.trial(self.trial)).goal
-        return goal, folder / "pictures", f"trial-{self.trial:03d}-seen"
+            goal = state.goal_of(state.trial(self.trial)).goal * np.array(metres, float)
+        return goal[np.argsort(axes)], folder / "pictures", f"trial-{self.trial:03d}-seen"
 
 
 def _refused(why: str) -> PerceptionFailedError:
