@@ -232,6 +232,21 @@ def test_one_box_for_both_objects_gives_no_number(wide):
     assert "one box for both" in reading.problem
 
 
+@pytest.mark.parametrize("size", [0.06, 0.065])
+@pytest.mark.parametrize("jitter", [0, 2])
+def test_one_box_for_two_objects_of_one_size_gives_no_number(size, jitter, flat):
+    class SaysOne(ColourClient):
+        def ask(self, words, picture):
+            off = jitter if "blue" in words else 0
+            return Answer(str([400 + off, 500 + off, 430 + off, 538 + off]), None, "stop")
+
+    scene = TableScene(SeenObject("the red stone", 0.06), SeenObject("the blue stone", size), 0.0)
+    with VisionLanguageModel(scene, client=SaysOne(), calibration=flat) as eye:
+        reading = eye.read(painted())
+    assert reading.error_seen is None
+    assert "one box for both" in reading.problem
+
+
 class Exchanges(ColourClient):
     """Gives the ring's box for the ball, and the ball's for the ring."""
 

@@ -185,7 +185,8 @@ class VisionLanguageModel(Perception):
         calibration, (tall, wide) = self._in(picture), picture.shape[:2]
         found = [(reached.box, self.scene.reached.size), (goal.box, self.scene.goal.size)]
         (_, one), (_, other) = found
-        if not _alike(one, other) and np.allclose(reached.box, goal.box, rtol=0, atol=1):
+        # Of another size its box would be another one, and of one size it lies beside.
+        if np.allclose(reached.box, goal.box, rtol=0, atol=_DRAWN * _step(picture)):
             return "the model gives one box for both objects"
         read = [_misfit(box, calibration, size) for box, size in found]
         swapped = [_misfit(self._swapped(box, wide / tall), calibration, s) for box, s in found]
