@@ -376,6 +376,7 @@ def test_fields_that_a_server_refuses_are_left_out():
     [
         ({"content": [{"type": "text", "text": "[[1,"}, {"text": " 2]]"}]}, "[[1, 2]]", None),
         ({"content": [{"type": "image"}]}, "", None),
+        ({"content": [{"type": "reasoning", "text": "[1]"}, {"text": "no"}]}, "no", None),
         ({"content": None, "reasoning": "so"}, "", "so"),
         ({"content": "a", "reasoning_content": "so"}, "a", "so"),
         ({"content": None, "refusal": "I cannot"}, "I cannot", None),

@@ -54,6 +54,10 @@ EXPECTED = (100.0, 200.0, 300.0, 500.0)
         "<|begin_of_box|>here<|end_of_box|> [[100, 200, 300, 500]]",
         '```json\n[{"bbox_2d": [100, 200, 300, 500], "label": "the 2, 3, 4 ball"}]\n```',
         "<|box_start|>(100,200),(300,500)<|box_end|>",
+        f"◁think▷It may be {DRAFT}◁/think▷{BOX}",
+        f"[THINK]It may be {DRAFT}[/THINK]{BOX}",
+        f"{BOX} Hope that helps!",
+        '[{"bbox_2d": [100, 200, 300, 500], "label": "the ball, not the hoop"}]',
     ],
 )
 def test_the_box_is_read(answer):
@@ -66,6 +70,12 @@ def test_the_box_is_read(answer):
         ("", "no box"),
         ("I'm sorry, I cannot help with that.", "no box in the answer \"I'm sorry"),
         ("There is no orange ball in this image.", "no box"),
+        ("At first I thought [[100, 200, 300, 500]], but it is hidden.", "but it is hidden"),
+        (f"{BOX} Sorry, that is another ball.", "another ball"),
+        (f"{BOX} On a closer look the ball isn't in the image.", "isn't in the image"),
+        (f"◁think▷It may be {DRAFT}◁/think▷ The ball is not in the image.", "no box"),
+        (f"[THINK]It may be {DRAFT}[/THINK]It is not there.", "no box"),
+        (f"<seed:think>It may be {DRAFT}", "still thinking"),
         ("[[100, 200, 300", "no box"),
         ("[[100, 200, 300]]", "no box"),
         (f"<think>It may be {BOX}", "still thinking"),

@@ -114,6 +114,7 @@ class VisionLanguageModelConfig(Checked):
 
 class _Part(msgspec.Struct):
     text: str | None = None
+    type: str = "text"
 
 
 class _Message(msgspec.Struct):
@@ -125,9 +126,11 @@ class _Message(msgspec.Struct):
 
     @property
     def text(self) -> str:
-        """What is said, or why nothing is."""
+        """What is said, or why nothing is; parts of another type, as `reasoning`, are no text."""
         said = self.content or self.refusal or ""
-        return said if isinstance(said, str) else "".join(part.text or "" for part in said)
+        if isinstance(said, str):
+            return said
+        return "".join(part.text or "" for part in said if part.type == "text")
 
 
 class _Choice(msgspec.Struct):

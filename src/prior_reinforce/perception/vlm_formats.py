@@ -105,10 +105,10 @@ def read_box(answer: str, box_format: BoxFormat, size: tuple[int, int]) -> Box:
         NotInPictureError: The answer is an empty list.
         UnreadableAnswerError: No box, several at once, or one that cannot be in the picture.
     """
-    _, thought_through, said = answer.rpartition("</think>")
-    if "<think>" in said and not thought_through:
+    thoughts = [*_THOUGHTS.finditer(answer)]
+    if thoughts and not thoughts[-1]["ends"]:
         raise UnreadableAnswerError("the answer ends while the model is still thinking")
-    said = " ".join(said.split())
+    said = " ".join(answer[thoughts[-1].end() if thoughts else 0 :].split())
     if len(said) > _LONGEST:
         raise UnreadableAnswerError(f"an answer of {len(said)} characters to a plain question")
     said = _OBJECT.sub(_as_list, said)
@@ -123,6 +123,10 @@ def read_box(answer: str, box_format: BoxFormat, size: tuple[int, int]) -> Box:
         raise NotInPictureError("the model says that it is not in the picture")
     if len(boxes) > 1:
         raise UnreadableAnswerError(f"{len(boxes)} boxes for one object")
+    *_, last = _BOX_OR_EMPTY.finditer(said)
+    behind = _QUOTED.sub("", said[last.end() :])
+    if _TAKEN_BACK.search(behind):
+        raise UnreadableAnswerError(f"behind its box the answer says {behind[:80].strip()!r}")
     key, *numbers = boxes[0]
     if key == "box_2d":
         box_format = FORMATS["gemini"]
@@ -150,6 +154,16 @@ _SIDES = (
 _MARKED = re.compile(
     r"<\|(?:begin_of_box|box_start)\|>(.*?)(?:<\|(?:end_of_box|box_end)\|>|\Z)", re.DOTALL
 )
+_THOUGHTS = re.compile(
+    r"[<\[◁](?P<ends>/?)(?:\w{1,9}:)?(?:think|thinking|thought|reasoning)[>\]▷]", re.IGNORECASE
+)
+"""Begin and end of thinking text: `<think>`, `[/THINK]`, `◁/think▷`, `</seed:think>`."""
+_QUOTED = re.compile(r"\"[^\"]*\"")
+_TAKEN_BACK = re.compile(
+    r"\b(?:no|not|never|none|cannot|but|however|wait|sorry|wrong|mistake)\b|n['’]t\b|[不没]",
+    re.IGNORECASE,
+)
+"""Words behind a box of an answer that does not stand by it; ours: models that do say little."""
 _SEPARATORS = re.compile(r"[\s,;\[\](){}<>]*")
 _MARKER = re.compile(r"<\|[a-z_]+\|>")
 
