@@ -12,9 +12,9 @@ from PIL import Image, ImageDraw
 
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.cli import main
-from prior_reinforce.perception.calibration import TableCalibration
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.parsing import from_words
+from prior_reinforce.perception.calibration import TableCalibration
 from prior_reinforce.perception.camera import Camera
 from prior_reinforce.simulation.tasks import make_task
 from tests.arm.workspace.planar import demonstrations, manifest
@@ -363,7 +363,7 @@ def test_four_corners_and_the_middle_blame_no_point(mistyped, tmp_path, run):
     clicked += [(1.4, 0.4, 735.5, 316.5), (1.4, -0.4, 1184.5, 316.5), (1, 0, 960.5, 539.5)]
     points = points_file(tmp_path / "points.csv", clicked)
     _, said, err = run("calibrate", points, "--out", tmp_path / "table.json")
-    assert "4 points are not tested" in said
+    assert "4 calibration points are not tested" in said
     assert ("that is coarse; give more points" in err) == (mistyped > 0)
     assert "others agree" not in err
 
@@ -381,7 +381,7 @@ def test_a_point_that_was_not_tested_is_not_cleared_by_blaming_another(tmp_path,
         ]
         points = points_file(tmp_path / "points.csv", clicked)
         _, said, err = run("calibrate", points, "--out", tmp_path / "table.json")
-        assert "points are not tested" in said
+        assert "calibration points are not tested" in said
         named += re.findall(r"without point (\d)", err)
     assert {*named} <= {"3"}
 
@@ -506,7 +506,7 @@ def test_four_points_tell_no_spread(drawn_table, capsys, run):
     run("calibrate", drawn_table / "points.csv", "--out", drawn_table / "table.json")
     with VisionServer() as server:
         assert look(drawn_table, server.base_url) == 0
-    assert "4 points are not tested by the others" in capsys.readouterr().err
+    assert "4 calibration points are not tested by the others" in capsys.readouterr().err
 
 
 def trial_for(goal, folder, names=("x", "y"), units=("m", "m"), scale=1.0):

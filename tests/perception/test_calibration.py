@@ -70,7 +70,7 @@ def test_four_points_say_nothing_of_the_error():
     assert calibration.fit_error < 1e-9
     assert calibration.left_out_error is None
     assert calibration.untested == 4
-    assert "4 points are not tested" in calibration.summary()
+    assert "4 calibration points are not tested" in calibration.summary()
 
 
 @pytest.mark.parametrize(("made_at", "wanted_at"), [(0.0, 0.1), (0.1, 0.0), (0.03, 0.2)])

@@ -196,7 +196,7 @@ class Look:
             )
         here = calibration.in_picture((picture.shape[1], picture.shape[0]))
         if untested := here.say_untested():
-            warn(f"of the calibration's points, {untested}, and calibrate again")
+            warn(f"{untested}, and calibrate again")
         if here is not calibration:
             warn(
                 "the picture has another size than that of the calibration, and is scaled to it; "

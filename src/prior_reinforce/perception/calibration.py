@@ -304,8 +304,8 @@ class TableCalibration:
         # Files of earlier versions say it of four points only.
         n = self.untested or (4 if self.left_out_error is None else 0)
         return bool(n) * (
-            f"{n} points are not tested by the others: one of them may be wrong; add the middles "
-            "of two opposite sides of the table"
+            f"{n} calibration points are not tested by the others, and may be wrong; add the "
+            "middles of two opposite sides of the table"
         )
 
     def save(self, path: str | os.PathLike[str]) -> None:
