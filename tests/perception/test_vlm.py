@@ -354,7 +354,7 @@ class Slanted:
         with VisionLanguageModel(
             SCENE, client=ColourClient(), calibration=self.calibration
         ) as perception:
-            return perception._scale(*found, self.picture)
+            return perception._scale(*found, self.picture)[0]
 
 
 @pytest.mark.parametrize("times", [0.7, 0.85, 1.0, 1.2, 1.3, 1.5])
@@ -516,9 +516,9 @@ def test_a_flat_box_around_what_is_not_round_hides_nothing(flat):
     np.testing.assert_array_equal(flat.sd_off(oblong.off), flat.sd)
 
 
-@pytest.mark.parametrize("shrunk", [0.95, 0.9, 0.85])
+@pytest.mark.parametrize("shrunk", [1.0, 0.98, 0.97, 0.96, 0.95, 0.9, 0.85])
 def test_a_distance_in_a_picture_that_is_shrunk_a_little_is_no_surer_than_it_is_right(shrunk, flat):
-    ball, hoop = np.array([0.95, 0.12]), np.array([1.0, 0.05])
+    ball, hoop = np.array([0.8, 0.32]), np.array([1.0, 0.05])
 
     class Shrinks(ColourClient):
         def ask(self, words, picture):

@@ -139,10 +139,9 @@ class VisionLanguageModel(Perception):
                 goal_place = goal.place + np.array(self.scene.goal_offset)
                 x, y = self._in(picture).to_pixels(goal_place).tolist()
                 goal_pixel = (x, y)
-                scale = self._scale(reached, goal, picture)
-                stretched = (reached.place - goal_place) * (1 / scale - 1)
+                scale, scale_sd = self._scale(reached, goal, picture)
                 of_boxes = self._in(picture).sd_off(np.hypot(reached.off, goal.off))
-                sd = np.hypot(of_boxes, stretched)
+                sd = np.maximum(of_boxes, scale_sd * np.abs(reached.place - goal_place))
         self.last_reading = PictureReading(
             picture, self._client.model, reached, goal, goal_place, goal_pixel, scale, sd
         )
@@ -217,8 +216,12 @@ class VisionLanguageModel(Perception):
             "are the sizes right?"
         )
 
-    def _scale(self, reached: Sighting, goal: Sighting, picture: Picture) -> float:
-        """How many times as large as they are both objects look; 1 where that may be chance."""
+    def _scale(self, reached: Sighting, goal: Sighting, picture: Picture) -> tuple[float, float]:
+        """How many times as large as they are both objects look, and the sd of a distance by that.
+
+        The scale is 1 where it may be chance. The sd is a share of the distance: the true scale
+        lies anywhere between what both boxes allow; in a simulated picture it is known to be 1.
+        """
         assert reached.box is not None
         assert goal.box is not None
         found = [(reached.box, self.scene.reached.size), (goal.box, self.scene.goal.size)]
@@ -228,11 +231,16 @@ class VisionLanguageModel(Perception):
         least = np.array([(sides / ball).max() for sides, _, ball in seen])
         most = np.array([(sides / disc).max() for sides, disc, _ in seen])
         low, high = (least - chance).max(), (most + chance).min()
-        if low > high or low <= 1 <= high:
-            return 1.0
-        return float(
-            least[np.argmax(least - chance)] if low > 1 else most[np.argmin(most + chance)]
-        )
+        scale = 1.0
+        if low > high:  # no scale is that of both
+            low, high = 1 - chance.min(), 1 + chance.min()
+        elif low > 1:
+            scale = float(least[np.argmax(least - chance)])
+        elif high < 1:
+            scale = float(most[np.argmin(most + chance)])
+        middle, sd = (low + high) / 2, (high - low) / np.sqrt(12)
+        simulated = self._scene_model is not None
+        return scale, 0.0 if simulated else float(np.hypot(middle - 1, sd) / middle)
 
     def _swapped(self, box: Box, wide: float) -> Box:
         """The box of the same numbers with x and y swapped, in a picture so many times as wide."""
