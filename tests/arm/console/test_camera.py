@@ -152,9 +152,11 @@ def test_what_is_not_round_may_look_flat(pictures):
     image.save(encoded, "JPEG", quality=95)
     calibrated(pictures)
     pictures.keep(encoded.getvalue())
-    found = pictures.find(Look("the orange book", 0.2))
+    found = pictures.find(Look("the orange book", 0.2, round=False))
     np.testing.assert_allclose(found.place, [0.95, 0.0], atol=0.005)
     assert found.sd == pictures.look_up().sd
+    # Of a ball of that size, half would be hidden.
+    assert pictures.find(Look("the orange ball", 0.2)).sd == pytest.approx(0.05, abs=0.005)
 
 
 def test_a_picture_is_of_the_trial_that_waits(pictures, verbs):

@@ -66,6 +66,8 @@ class Look(Struct, forbid_unknown_fields=True):
     size: float
     """Longer side of a box around it, in [m]."""
     by: Literal["colour", "model"] = "colour"
+    round: bool = True
+    """Whether it is as wide from all sides; a flatter box is then taken for a part of it."""
 
 
 class Found(Struct):
@@ -162,7 +164,7 @@ class Pictures:
         calibration = self._calibration()
         if calibration is None:
             raise ConfigurationError("the camera is not calibrated; touch the known points first")
-        wanted = SeenObject(body.words, body.size, round=False)  # nobody says its shape
+        wanted = SeenObject(body.words, body.size, body.round)
         scene = TableScene(wanted, wanted, plane_height=calibration.height)
         client = ColourClient(self._vlm.family) if body.by == "colour" else None
         with VisionLanguageModel(scene, self._vlm, client=client, calibration=calibration) as model:

@@ -1157,7 +1157,7 @@ async function calibrate() {
   if (camera) { L.calibrating = false; seen(camera); }
 }
 async function find(by) {
-  const found = await send("/api/find", "POST", JSON.stringify({ words: L.what || "the orange ball", size: (L.size || 7) / 100, by }));
+  const found = await send("/api/find", "POST", JSON.stringify({ words: L.what || "the orange ball", size: (L.size || 7) / 100, round: L.round !== false, by }));
   if (!found) return;
   box = found.box;
   L.view = "picture";
@@ -1179,7 +1179,8 @@ function drawCamera() {
     if (C.to_table) {
       parts.push(details("find", "Find the object in the picture",
         h("div", { class: "fields" }, h("label", {}, "What", h("input", { type: "text", id: "what", value: L.what || "the orange ball", oninput: (event) => { L.what = event.target.value; } })),
-          h("label", {}, "Its size [cm]", h("input", { type: "text", inputmode: "decimal", id: "size", value: L.size || 7, oninput: (event) => { L.size = parseFloat(event.target.value) || 7; } }))),
+          h("label", {}, "Its size [cm]", h("input", { type: "text", inputmode: "decimal", id: "size", value: L.size || 7, oninput: (event) => { L.size = parseFloat(event.target.value) || 7; } })),
+          h("label", {}, h("input", { type: "checkbox", id: "round", checked: L.round !== false, onchange: (event) => { L.round = event.target.checked; } }), " It is round")),
         h("div", { class: "row" }, button("colour", "By its colour", () => find("colour")), button("model", "By a model", () => find("model")))));
     }
   }
