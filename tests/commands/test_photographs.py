@@ -304,6 +304,9 @@ def points_file(path, points=POINTS, names=("x", "y", "u", "v"), sep=",", dec=".
         {"sep": ";", "end": ";;;\n\n"},
         {"names": ("X", "Y", "U", "V")},
         {"names": ("x", " y", "u", "v ")},
+        {"names": ("x (m)", "y (m)", "u (px)", "v (px)")},
+        {"names": ("x_m", "y_m", "u_px", "v_px")},
+        {"names": ("x [m]", "y [m]", "u in pixels", "v/px")},
     ],
 )
 def test_points_are_read_as_a_spreadsheet_writes_them(tmp_path, run, written):
@@ -330,6 +333,31 @@ def test_points_may_be_measured_in_other_units(tmp_path, run, unit, in_m):
     )
     assert len(one) > 8
     np.testing.assert_allclose(other, one, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("names", "says", "mended"),
+    [
+        (("x [ft]", "y [ft]", "u", "v"), "x is in ft", "x [m]"),
+        (("x", "y [Zoll]", "u", "v"), "y is in Zoll", "y [m]"),
+        (("x", "y", "u [%]", "v [%]"), "u is in percent", "u [px]"),
+    ],
+)
+def test_points_in_units_that_are_not_known_say_what_to_write(tmp_path, run, names, says, mended):
+    points = points_file(tmp_path / "points.csv", names=names)
+    status, _, err = run("calibrate", points, "--out", tmp_path / "table.json")
+    assert status == 2
+    assert says in err
+    assert f"in the head: {mended}" in err
+    assert "--units" not in err
+
+
+def test_pixels_counted_from_the_pictures_middle_are_refused(tmp_path, run):
+    centred = [(x, y, u - 960, v - 540) for x, y, u, v in POINTS]
+    points = points_file(tmp_path / "points.csv", centred)
+    status, _, err = run("calibrate", points, "--out", tmp_path / "table.json")
+    assert status == 2
+    assert "from the picture's top left corner" in err
 
 
 def test_points_in_other_columns_may_stand_beside(tmp_path, run):
@@ -363,7 +391,7 @@ def test_four_corners_and_the_middle_blame_no_point(mistyped, tmp_path, run):
     clicked += [(1.4, 0.4, 735.5, 316.5), (1.4, -0.4, 1184.5, 316.5), (1, 0, 960.5, 539.5)]
     points = points_file(tmp_path / "points.csv", clicked)
     _, said, err = run("calibrate", points, "--out", tmp_path / "table.json")
-    assert "4 calibration points are not tested" in said
+    assert "4 points are not tested" in said
     assert ("that is coarse; give more points" in err) == (mistyped > 0)
     assert "others agree" not in err
 
@@ -381,7 +409,7 @@ def test_a_point_that_was_not_tested_is_not_cleared_by_blaming_another(tmp_path,
         ]
         points = points_file(tmp_path / "points.csv", clicked)
         _, said, err = run("calibrate", points, "--out", tmp_path / "table.json")
-        assert "calibration points are not tested" in said
+        assert "points are not tested" in said
         named += re.findall(r"without point (\d)", err)
     assert {*named} <= {"3"}
 
@@ -506,7 +534,7 @@ def test_four_points_tell_no_spread(drawn_table, capsys, run):
     run("calibrate", drawn_table / "points.csv", "--out", drawn_table / "table.json")
     with VisionServer() as server:
         assert look(drawn_table, server.base_url) == 0
-    assert "4 calibration points are not tested by the others" in capsys.readouterr().err
+    assert "4 points are not tested by the others" in capsys.readouterr().err
 
 
 def trial_for(goal, folder, names=("x", "y"), units=("m", "m"), scale=1.0):
@@ -618,7 +646,7 @@ def test_a_picture_that_is_cut_in_the_same_shape_is_no_sure_reading(drawn_table,
 
 
 def test_an_object_that_the_border_cuts_is_told(drawn_table, capsys):
-    drawn(drawn_table / "photo.png", ball=(0.9, 1.28))
+    drawn(drawn_table / "photo.png", ball=(0.9, 1.28), hoop=(1.0, 1.1))
     with VisionServer() as server:
         assert look(drawn_table, server.base_url) == 0
     said = capsys.readouterr()

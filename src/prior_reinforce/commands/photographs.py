@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
     from prior_reinforce.perception.vlm_reading import PictureReading, Sighting
 
 _COLUMNS = ("x", "y", "u", "v")
+_IN_PIXELS = re.compile(r"([uv])[\s_/\[(]+(?:in[\s_]+)?(?:px|pixels?)[\])]?", re.IGNORECASE)
+"""`u [px]`, `v_px`, `u in pixels`."""
 _COARSE = 0.02
 """Spread of a calibration that is warned of, in [m]; ours: more than any task's tolerance."""
 _BESIDE = 5.0
@@ -88,6 +91,11 @@ class Calibrate:
             raise ConfigurationError(
                 f"a point {np.abs(table_points).max():g} m away looks like {UNITS[looks].plural}; "
                 f"write x [{looks}] and y [{looks}] in the head (inches: [in]), or metres"
+            )
+        if np.any(pixels < 0):
+            raise ConfigurationError(
+                f"pixels down to {pixels.min(axis=0).tolist()} are negative; count u to the right "
+                "and v down from the picture's top left corner"
             )
         size = None
         if self.picture is not None:
@@ -195,8 +203,8 @@ class Look:
                 "then, both errors' signs are wrong: save both as PNG, and calibrate again"
             )
         here = calibration.in_picture((picture.shape[1], picture.shape[0]))
-        if untested := here.say_untested():
-            warn(f"{untested}, and calibrate again")
+        if here.untested:
+            warn(f"{here.summary()}, and calibrate again")
         if here is not calibration:
             warn(
                 "the picture has another size than that of the calibration, and is scaled to it; "
@@ -393,17 +401,28 @@ def _photograph(camera: str, path: Path) -> None:
 def _read_points(path: Path) -> Float[np.ndarray, "n 4"]:
     """Rows of x, y [m] (a head may say `x [cm]`), u, v [px]; rows without any are skipped."""
     from prior_reinforce.arm.recordings.tables import read_table
-    from prior_reinforce.arm.recordings.units import conversion, split_unit
+    from prior_reinforce.arm.recordings.units import split_unit
 
     table = read_table(path, head=_COLUMNS)
-    split = [split_unit(name.strip(), any_word=True) for name in table.names]
+    heads = [_IN_PIXELS.sub(r"\1 [px]", name.strip()) for name in table.names]
+    split = [split_unit(name, any_word=True) for name in heads]
     names = [name.lower() for name, _ in split]
     if missing := {*_COLUMNS} - {*names}:
         raise FileFormatError(
             f"{path} has no column {min(missing)}; expected a CSV with the columns "
-            f"{', '.join(_COLUMNS)} and a number in each"
+            f"{', '.join(_COLUMNS)} (or with a unit: x [mm]) and a number in each"
         )
     at = [names.index(name) for name in _COLUMNS]
-    scale = [conversion(table.units[c] or split[c][1] or "m", "m", names[c]) for c in at[:2]]
+    units = [table.units[c] or split[c][1] for c in at]
+    scale = [factor(unit or "m", "m") for unit in units[:2]] + [
+        1.0 if unit in (None, "px") else None for unit in units[2:]
+    ]
+    for name, unit, known in zip(_COLUMNS, units, scale, strict=True):
+        if known is None:
+            wanted = "m, cm, mm or in" if name in "xy" else "px, from the picture's top left corner"
+            raise FileFormatError(
+                f"{path}: {name} is in {unit}; give it in {wanted}, and say so in the head: "
+                f"{name} [{wanted.split(',')[0]}]"
+            )
     rows = table.rows([i for i in range(len(table)) if any(table.cells[c][i] for c in at)])
-    return rows.columns(at) * [*scale, 1.0, 1.0]
+    return rows.columns(at) * np.array(scale, float)

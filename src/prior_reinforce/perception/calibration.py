@@ -40,7 +40,6 @@ class _Saved(
         "worst_sd": "worst_sd_m",
         "clicked": "clicked_px",
         "exif": "exif_orientation",
-        "untested": "untested_points",
     },
 ):
     """What a file holds of a `TableCalibration`; its numbers are finite, as JSON's are."""
@@ -110,8 +109,7 @@ class TableCalibration:
     exif: int | None = None
     """EXIF orientation of the photograph in which points were clicked; None without one."""
     untested: int = 0
-    """How many points are not tested, as the others leave open where they are: a wrong one of them
-    may not show. Zero where nobody said."""
+    """How many points the others leave open, so that a wrong one of them may not show."""
 
     @property
     def sd(self) -> float:
@@ -184,8 +182,7 @@ class TableCalibration:
         homography = _direct_linear_transform(points, seen)
         fit_error = _rms(_map(np.linalg.inv(homography), seen) - points)
         misses, _ = left_out_errors(points, seen)
-        tested = misses[~np.isnan(misses)]
-        left_out = float(np.sqrt(np.mean(tested**2))) if len(tested) else None
+        left_out = None if np.isnan(misses).all() else float(np.sqrt(np.nanmean(misses**2)))
         # Of four points nothing is left over that would show the pixels' noise.
         n_free = max(2 * len(points) - 8, 1)
         residual = np.linalg.norm(_map(homography, points) - seen) / np.sqrt(n_free)
@@ -193,7 +190,7 @@ class TableCalibration:
         worst = per_pixel * float(max(_CLICK_SD, residual))
         clicked = *seen.min(axis=0).tolist(), *seen.max(axis=0).tolist()
         fitted = cls(homography, float(height), fit_error, left_out, picture, worst, clicked)
-        return replace(fitted, untested=len(points) - len(tested))
+        return replace(fitted, untested=int(np.isnan(misses).sum()))
 
     def to_table(self, pixels: ArrayLike) -> Float[np.ndarray, "*n 2"]:
         """Map pixels, shape (..., 2), to points in the plane, in [m]."""
@@ -291,22 +288,15 @@ class TableCalibration:
 
     def summary(self) -> str:
         """One line for the operator, in centimetres."""
-        beside = f"{100 * self.worst_sd:.2f} cm at worst in the square around them"
-        plane = f"plane {100 * self.height:.1f} cm above the table"
-        if untested := self.say_untested():
-            return f"calibrated, {beside}, {plane}; {untested}"
-        assert self.left_out_error is not None
-        left_out = f"{100 * self.left_out_error:.2f} cm (each point through the others)"
-        return f"calibrated to {left_out}, {beside}, {plane}"
-
-    def say_untested(self) -> str:
-        """How many points the others do not test, and what to do; empty where they test all."""
-        # Files of earlier versions say it of four points only.
-        n = self.untested or (4 if self.left_out_error is None else 0)
-        return bool(n) * (
-            f"{n} calibration points are not tested by the others, and may be wrong; add the "
-            "middles of two opposite sides of the table"
-        )
+        at_worst = f"{100 * self.worst_sd:.2f} cm at worst in the square around them"
+        says = f"{at_worst}, plane {100 * self.height:.1f} cm above the table"
+        if self.untested or self.left_out_error is None:
+            return (
+                f"calibrated, {says}; {self.untested} points are not tested by the others, and may "
+                "be wrong: add the middles of two opposite sides of the table"
+            )
+        left_out = f"{100 * self.left_out_error:.2f} cm"
+        return f"calibrated to {left_out} (each point through the others), {says}"
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the calibration as JSON."""
@@ -332,6 +322,7 @@ class TableCalibration:
                 "TableCalibration.save"
             ) from error
         own = msgspec.structs.asdict(saved) | {"homography": np.array(saved.homography)}
+        own["untested"] = own["untested"] or 4 * (saved.left_out_error is None)  # of older files
         del own["kind"]
         return cls(**own)
 
