@@ -99,7 +99,7 @@ class WorkspaceError(PriorReinforceError, RuntimeError):
 def one_of(hint: Any) -> str:
     """The remedy for a value that is none of a `Literal`; empty where another kind may stand."""
     alternatives = (hint,) if get_origin(hint) is Literal else get_args(hint)
-    kinds = [kind for kind in alternatives if kind is not NoneType]
+    kinds = [kind for kind in alternatives if kind not in (NoneType, ...)]
     if not kinds or any(get_origin(kind) is not Literal for kind in kinds):
         return ""
     return f"; use one of {', '.join(str(value) for kind in kinds for value in get_args(kind))}"

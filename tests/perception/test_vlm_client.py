@@ -320,6 +320,7 @@ def refused(address, **settings):
         (b"403 No", "Your country is not supported", "what the key may do"),
         (b"413 Big", "Request entity too large", "lower max_image_side"),
         (b"401 No", "Incorrect API key provided", "api_key_variable"),
+        (b"400 Bad", "API key not valid. Please pass a valid API key.", "api_key_variable"),
         (b"404 No", "The model `x` has been deprecated", "base_url and model"),
         (b"400 Bad", "Unsupported parameter: 'max_tokens'", "leave_out = ['max_tokens']"),
         (b"400 Bad", "Unsupported value: 'temperature' is 1 alone", "leave_out = ['temperature']"),
@@ -327,10 +328,11 @@ def refused(address, **settings):
         (b"500 Oh", "CUDA out of memory", "server's log"),
     ],
 )
-@pytest.mark.parametrize("form", ["error", "bare", "detail", "text"])
+@pytest.mark.parametrize("form", ["error", "list", "bare", "detail", "text"])
 def test_a_refusal_has_the_servers_own_words_and_a_remedy(status, words, remedy, form):
     reply = {
         "error": {"error": {"message": words, "code": "x"}},
+        "list": [{"error": {"message": words, "code": "x"}}],
         "bare": {"message": words},
         "detail": {"detail": words},
         "text": words.encode(),
@@ -338,7 +340,7 @@ def test_a_refusal_has_the_servers_own_words_and_a_remedy(status, words, remedy,
     content = body(reply).replace(b"200 OK", status)
     with endpoint(lambda file: file.write(content)) as (address, _):
         said = refused(address)
-    assert words[:60] in said
+    assert f": {words[:60]}" in said
     assert remedy in said
 
 
@@ -359,6 +361,43 @@ def test_a_family_that_is_unknown_in_a_file_is_told_with_those_that_are_known(tm
     path = vlm_file(tmp_path, "http://127.0.0.1:8000/v1", server="ollama")
     with pytest.raises(ConfigurationError, match=r"'ollama'.*use one of vllm, zai, plain"):
         VisionLanguageModelConfig.load(path)
+
+
+@pytest.mark.parametrize(
+    ("location", "leads", "remedy"),
+    [
+        (
+            "https://gpu.example/v1/chat/completions",
+            "https://gpu",
+            "set base_url to https://gpu.exa",
+        ),
+        ("/api/v1/chat/completions", "/api/v1/chat", "/api/v1"),
+        ("https://me:secret-7@gpu.example/v2/chat/completions", "https://gpu", "gpu.example/v2"),
+        ("http://[::1", "failed", "server's log"),
+    ],
+)
+def test_a_redirection_says_where_it_leads(location, leads, remedy):
+    content = body({}, Location=location).replace(b"200 OK", b"301 Moved")
+    with endpoint(lambda file: file.write(content)) as (address, _):
+        said = refused(address)
+    assert leads in said
+    assert said.endswith(remedy) or remedy in said
+    assert "secret" not in said
+
+
+def test_a_proxy_that_wants_a_password_is_named(monkeypatch):
+    content = body(b"<html>Proxy Authentication Required</html>").replace(b"200 OK", b"407 No")
+    with endpoint(lambda file: file.write(content)) as (address, _):
+        monkeypatch.setenv("http_proxy", f"http://{address.removesuffix('/v1')}")
+        for name in ("NO_PROXY", "no_proxy", "HTTP_PROXY"):
+            monkeypatch.delenv(name, raising=False)
+        said = refused("gpu.example/v1")
+    assert "give it in http_proxy" in said
+
+
+def test_a_field_to_leave_out_that_no_request_has_is_refused():
+    with pytest.raises(ConfigurationError, match=r"leave_out.*max_token.*use one of max_tokens"):
+        VisionLanguageModelConfig(leave_out=("max_token",))
 
 
 def test_fields_that_a_server_refuses_are_left_out():
@@ -440,6 +479,9 @@ def test_why_a_server_cannot_be_reached_is_named(certificate):
         known = replace(secret, certificate=str(certificate[0]))
         assert OpenAIClient(known).ask("the ball", SQUARE).text == "[[1, 2, 3, 4]]"
         assert "http or https" in refused(address)  # without TLS
+        other = replace(known, base_url=f"https://{address}".replace("127.0.0.1", "localhost"))
+        with pytest.raises(EndpointError, match=r"base_url to the name.*certificate"):
+            OpenAIClient(other).ask("the ball", SQUARE)
     for host in ("gpu-box.invalid:8000/v1", "127.0.0.1:9/v1"):
         said = refused(host)
         assert "cannot reach" in said

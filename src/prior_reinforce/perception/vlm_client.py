@@ -9,8 +9,8 @@ import ssl
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal, Protocol
-from urllib.parse import urlsplit
+from typing import Annotated, Any, Literal, Protocol, get_args
+from urllib.parse import urljoin, urlsplit
 
 import msgspec
 from typing_extensions import Self
@@ -31,7 +31,9 @@ _MOST_BYTES, _BYTES_A_TOKEN = 65_536, 100
 _HIDDEN = 8
 """Characters of a key in a row that nobody shows; ours: no shorter piece tells a key."""
 _THIS_MACHINE = {"127.0.0.1", "localhost", "::1"}
-_FIELDS = ("max_tokens", "temperature", "chat_template_kwargs", "skip_special_tokens", "thinking")
+_Field = Literal[
+    "max_tokens", "temperature", "chat_template_kwargs", "skip_special_tokens", "thinking"
+]
 """Of a request, which some servers refuse."""
 _PROXIES = ("all_proxy", "http_proxy", "https_proxy")
 
@@ -53,7 +55,7 @@ class VisionLanguageModelConfig(Checked):
     """Environment variable that holds the key; None for a server that wants none."""
     certificate: str | None = None
     """File (.pem) with the certificate of a server that signs its own."""
-    leave_out: tuple[str, ...] = ()
+    leave_out: tuple[_Field, ...] = ()
     """Fields of the request that the server refuses: `max_tokens`, `temperature`, ..."""
     enable_thinking: bool = False
     """Let the model think first: slower, and `max_tokens` must be enough to finish."""
@@ -302,7 +304,9 @@ class OpenAIClient:
                 return f"{url} sends {each}; raise max_tokens if it is meant to"
         if isinstance(error, openai.APIConnectionError):
             remedy = "is the server running? is the address right, http or https?"
-            if "CERTIFICATE" in said:
+            if "certificate is not valid for" in said:
+                remedy = "set base_url to the name that the server's certificate is for"
+            elif "CERTIFICATE" in said:
                 remedy = "give the server's own certificate, a .pem file, as certificate"
             elif self._proxied and _proxies():
                 remedy += f" {' or '.join(_proxies())} sets a proxy"
@@ -320,8 +324,8 @@ class OpenAIClient:
             wait = error.response.headers.get("Retry-After", "")
             asked = f"{wait} s, as it asks" if wait.isdecimal() else "a minute"
             remedy = f"wait {asked}, or see to the account's quota"
-        elif error.status_code == 401:
-            what, remedy = "refuses the key (HTTP 401)", "set api_key_variable"
+        elif error.status_code == 401 or (error.status_code == 400 and "api key" in said.lower()):
+            what, remedy = f"refuses the key (HTTP {error.status_code})", "set api_key_variable"
         elif error.status_code == 403:
             what = "refuses the request (HTTP 403)"
             remedy = "see to what the key may do, and in which country"
@@ -330,7 +334,14 @@ class OpenAIClient:
         elif error.status_code == 404:
             what = f"does not serve model '{config.model}' (HTTP 404)"
             remedy = "set base_url and model"
-        elif fields := [field for field in _FIELDS if field in said]:
+        elif error.status_code == 407 and self._proxied:
+            what = "is behind a proxy that wants a password (HTTP 407)"
+            remedy = f"give it in {' or '.join(_proxies())}, as http://NAME:PASSWORD@proxy:3128"
+        elif to := self._hidden(_redirected(error.response.headers.get("Location", ""), url)):
+            what = f"sends the request on to {to} (HTTP {error.status_code})"
+            if (base := to.rstrip("/").removesuffix("/chat/completions")) != url.rstrip("/"):
+                remedy = f"set base_url to {base}"
+        elif fields := [field for field in get_args(_Field) if field in said]:
             remedy = f"where a field is not supported, set leave_out = {fields}"
         return f"{url} {what}: {said}; {remedy}"
 
@@ -340,6 +351,7 @@ class OpenAIClient:
         words: object = content.decode(errors="replace") or error.__cause__ or error
         with suppress(ValueError, RecursionError):
             body = msgspec.json.decode(content) if content else body
+        body = body[0] if isinstance(body, list) and body else body  # as Gemini wraps its errors
         named = body.get("error") or body if isinstance(body, dict) else body
         if isinstance(named, dict):
             named = named.get("message") or named.get("detail")
@@ -350,6 +362,14 @@ class OpenAIClient:
         # The key is hidden before anything is cut: the rest of it would be no longer found.
         said = " ".join(self._hidden(str(words) or type(words).__name__).split())
         return said[:_MOST_SHOWN], isinstance(body, dict) and bool(named)
+
+
+def _redirected(location: str, url: str) -> str:
+    """Where a redirection of a request to an endpoint leads; empty where that is no address."""
+    with suppress(ValueError, ConfigurationError):
+        to = without_secrets(urljoin(f"{url.rstrip('/')}/chat/completions", location))
+        return to[:_MOST_SHOWN] if location else ""
+    return ""
 
 
 def _proxies() -> list[str]:
