@@ -2,6 +2,7 @@
 
 import io
 
+import cv2
 import numpy as np
 import pytest
 from PIL import Image
@@ -27,6 +28,19 @@ def test_a_picture_of_more_than_eight_bits_keeps_its_shades(bits):
     assert seen.dtype == np.uint8
     np.testing.assert_allclose(seen[..., 0], RAMP * 255, atol=1.5)
     assert (seen == seen[..., :1]).all()
+
+
+@pytest.mark.parametrize("bits", [12, 16])
+def test_a_picture_of_more_than_eight_bits_in_colour_is_brightened_too(bits):
+    """Of 12 bits, which a camera stores in 16, Pillow reads 4."""
+    blue = (RAMP * (2**bits - 1)).astype(np.uint16)
+    _, content = cv2.imencode(".png", np.stack([blue, blue // 2, 0 * blue], axis=-1))
+    seen = read_picture(io.BytesIO(content.tobytes())).astype(float)
+    coarse = 255 / (2 ** (bits - 8) - 1)
+    np.testing.assert_allclose(seen[..., 2], RAMP * 255, atol=coarse + 1)
+    np.testing.assert_allclose(seen[..., 1], RAMP * 127, atol=coarse + 1)
+    assert seen.max() == 255
+    assert seen[..., 0].max() == 0
 
 
 @pytest.mark.parametrize("mode", ["1", "L", "LA", "P", "RGB", "RGBA"])

@@ -43,10 +43,12 @@ def read_picture(source: Path | BinaryIO) -> Picture:
         with Image.open(source, formats=("PNG", "JPEG")) as image:
             if image.width * image.height > _MOST_PIXELS:  # before any is read
                 raise ValueError("too many pixels")
+            deep = ";16" in str(image.tile[0][3])  # of which Pillow reads the upper 8 in colour
             upright = ImageOps.exif_transpose(image)
-            if upright.mode[0] in "IF":
-                grey = np.asarray(upright, dtype=float)
-                upright = Image.fromarray((grey * (255 / max(grey.max(), 1))).astype(np.uint8))
+            if deep or upright.mode[0] in "IF":
+                grey = upright.mode[0] in "IF"
+                levels = np.asarray(upright if grey else upright.convert("RGB"), dtype=float)
+                upright = Image.fromarray((levels * (255 / max(levels.max(), 1))).astype(np.uint8))
             return np.asarray(upright.convert("RGB"))
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         what = f"the picture {source}" if isinstance(source, Path) else "that as a picture"
