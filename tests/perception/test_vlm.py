@@ -247,6 +247,24 @@ def test_one_box_for_two_objects_of_one_size_gives_no_number(size, jitter, flat)
     assert "one box for both" in reading.problem
 
 
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        np.zeros((480, 640), np.uint8),
+        np.zeros((480, 640, 1), np.uint8),
+        np.zeros((480, 640, 4), np.uint8),
+        np.zeros((480, 640, 3)),
+        np.zeros((480, 640, 3), np.uint16),
+        [[[0, 0, 0]]],
+        None,
+    ],
+)
+def test_an_array_that_is_no_rgb_picture_is_refused_with_what_it_should_be(wrong, calibration):
+    perception = VisionLanguageModel(SCENE, client=ColourClient(), calibration=calibration)
+    with pytest.raises(ConfigurationError, match=r"\(height, width, 3\) and uint8; convert it"):
+        perception.read(wrong)
+
+
 class Exchanges(ColourClient):
     """Gives the ring's box for the ball, and the ball's for the ring."""
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from jaxtyping import Float
+from numpy.typing import ArrayLike
 
 from prior_reinforce.arrays import Point
 from prior_reinforce.environment import KeyFrame, Picture, Rollout, SeenObject, TableScene
@@ -119,15 +120,19 @@ class VisionLanguageModel(Perception):
         assert reading.sd is not None
         return Reading.measured(reading.error_seen, reading.sd)
 
-    def read(self, picture: Picture) -> PictureReading:
+    def read(self, picture: ArrayLike) -> PictureReading:
         """Read the error from any picture of the calibrated camera, a photograph for instance.
+
+        Args:
+            picture: RGB, shape (height, width, 3), of type uint8.
 
         Returns:
             The record; its `error_seen` is None, and `problem` says why, where reading failed.
 
         Raises:
-            ConfigurationError: There is no calibration.
+            ConfigurationError: There is no calibration, or the picture is not RGB in uint8.
         """
+        picture = _rgb(picture)
         goal = goal_place = goal_pixel = sd = None
         scale = 1.0
         reached = self.find(self.scene.reached, picture)
@@ -329,6 +334,16 @@ class VisionLanguageModel(Perception):
             absent = isinstance(error, vlm_formats.NotInPictureError)
             return replace(answer, problem=str(error), absent=absent)
         return replace(answer, box=(left, top, right, bottom))
+
+
+def _rgb(picture: ArrayLike) -> Picture:
+    array = np.asarray(picture)
+    if array.dtype != np.uint8 or array.ndim != 3 or array.shape[2] != 3:
+        raise ConfigurationError(
+            f"a picture of shape {array.shape} and type {array.dtype}: expected RGB, (height, "
+            "width, 3) and uint8; convert it, or open its file with `read_picture`"
+        )
+    return array
 
 
 def _shrunk(picture: Picture, config: VisionLanguageModelConfig) -> Picture:
