@@ -219,7 +219,7 @@ def build(config: type[Any], settings: Mapping[str, Any], choice: str = "") -> A
     try:
         return msgspec.convert(_plain(config, settings, choice), config, strict=False)
     except msgspec.ValidationError as error:
-        named = re.search(r"`\$\.(\w+)`$", str(error))
+        named = re.search(r"`\$\.(\w+)(?:\[\d+\])?`$", str(error))
         remedy = one_of(typing.get_type_hints(config)[named[1]]) if named else ""
         raise ConfigurationError(f"{choice}: {error}{remedy}") from error
 

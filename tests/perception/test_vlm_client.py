@@ -395,7 +395,11 @@ def test_a_proxy_that_wants_a_password_is_named(monkeypatch):
     assert "give it in http_proxy" in said
 
 
-def test_a_field_to_leave_out_that_no_request_has_is_refused():
+def test_a_field_to_leave_out_that_no_request_has_is_refused(tmp_path):
+    path = vlm_file(tmp_path, "http://127.0.0.1:8000/v1")
+    path.write_text(f'{path.read_text()}\nleave_out = ["max_token"]\n')
+    with pytest.raises(ConfigurationError, match=r"leave_out.*use one of max_tokens, temp"):
+        VisionLanguageModelConfig.load(path)
     with pytest.raises(ConfigurationError, match=r"leave_out.*max_token.*use one of max_tokens"):
         VisionLanguageModelConfig(leave_out=("max_token",))
 
