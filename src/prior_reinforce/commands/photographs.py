@@ -239,9 +239,12 @@ class Look:
             f"{100 * abs(e):.2f}+-{100 * s:.2f} cm {positive if e >= 0 else negative}"
             for e, s, (positive, negative) in zip(error, sd, WORDS[:2], strict=True)
         )
-        of, right = f"{shlex.quote(str(folder.parent))} {self.trial}", "if the boxes are right"
+        of, right = (
+            f"{shlex.quote(str(folder.parent))} {self.trial}",
+            "if that and the boxes are right",
+        )
         if goal is None:
-            of, right = "FOLDER TRIAL", f"{right} and outcomes are x and y only"
+            of, right = "FOLDER TRIAL", f"{right}, and outcomes are x and y"
         print(f'{right}: prior-reinforce tell {of} --error "{told}"')
 
     def _beside_goal(
