@@ -120,7 +120,7 @@ def test_mixed_demonstrations_that_are_all_off_by_the_same_tell_it_at_once():
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_landing_that_bends_between_mixed_demonstrations_is_learned_as_fast_as_without(sign):
+def test_landing_that_bends_between_mixed_demonstrations_is_learned(sign):
     """Where little was taken to lie between demonstrations, aims beside the goal were repeated."""
     distances, bearings = np.array([0.85, 0.95, 1.06, 1.18, 1.31]), [-0.2, 0.15, 0.0, -0.1, 0.2]
     outcomes = distances[:, None] * np.column_stack([np.cos(bearings), np.sin(bearings)])

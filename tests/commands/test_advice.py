@@ -60,3 +60,17 @@ def test_before_a_goal_it_draws_what_moved_motions_can_reach(run, tmp_path):
     run("tell", folder, 1, "hit")
     assert run("report", folder)[0] == 0
     assert "What can be reached" in (folder / "report" / "report.html").read_text()
+
+
+@pytest.mark.slow
+def test_where_a_turn_was_found_no_throw_and_no_demonstration_teaches_most(run, tmp_path):
+    folder = tmp_path / "hoop"
+    shown = pr.make_task("basketball-v1").demonstrations("A").without_symmetry()
+    with Workspace.create(folder, no_box=True) as hoop:
+        hoop.import_demonstrations(shown, "throws")
+        hoop.learn()
+    run("goal", folder, "1.0", "0.1")
+    status, out, _ = run("advise", folder)
+    assert status == 0
+    assert "hit is likeliest at" in out
+    assert "teaches most" not in out

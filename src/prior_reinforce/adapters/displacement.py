@@ -142,7 +142,11 @@ class DisplacementPrior:
     ) -> Float[np.ndarray, "m p n"]:
         """Between displacements at a and b; with what is different from the demonstrations' day."""
         (w_a, of_a, s_a, _), (w_b, of_b, s_b, _) = self._at(a), self._at(b)
-        bent = self._matern(a, b) * np.outer(s_a, s_b) - of_a @ w_b.T - w_a @ of_b.T
+        bent = (
+            matern(a, b, self.config.generator_reach) * np.outer(s_a, s_b)
+            - of_a @ w_b.T
+            - w_a @ of_b.T
+        )
         covariance = self._square[:, None, None] * bent + (w_a * self._label) @ w_b.T
         covariance += self.noise[:, None, None] * (w_a @ w_b.T)
         if hardware:
@@ -173,14 +177,12 @@ class DisplacementPrior:
             if len(self._asked) >= _REMEMBERED:
                 self._asked.pop(next(iter(self._asked)))
             known, w = self._demonstrated, self._weights(self.normalisation.undo(at))
-            left = self._matern(at, known) - 0.5 * w @ self._matern(known, known)
+            reach = self.config.generator_reach
+            left = matern(at, known, reach) - 0.5 * w @ matern(known, known, reach)
             scaled = np.minimum(1.0, _STEEPEST / np.linalg.norm(w, axis=1))
             expected = (w @ self._correction).T
             self._asked[key] = scaled[:, None] * w, scaled[:, None] * left, scaled, expected
         return self._asked[key]
-
-    def _matern(self, a: Float[np.ndarray, "p k"], b: Points) -> Float[np.ndarray, "p n"]:
-        return matern(a, b, self.config.generator_reach)
 
 
 def matern(a: Float[np.ndarray, "p k"], b: Points, reach: float) -> Float[np.ndarray, "p n"]:

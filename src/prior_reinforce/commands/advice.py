@@ -58,7 +58,7 @@ class Advise(OnWorkspace):
                 f"the adapter {session.goals[-1].adapter} knows no probabilities; set the "
                 "goal with --adapter bayes"
             )
-        demonstrations = session.demonstrations
+        demonstrations = session.generator.with_symmetry_used(session.demonstrations)
         outcomes, moved = demonstrations.outcomes_seen, demonstrations.symmetry is not None
         low, high = region_around(demonstrations) if moved else _around(outcomes)
         goals = _grid(low, high)

@@ -110,8 +110,8 @@ class Generator(ABC):
         """
         return self._generate(as_conditions(conditions, self._fitted_to()))
 
-    def shown(self, demonstrations: Demonstrations) -> Demonstrations:
-        """Return what it was fitted to with the symmetry by which it moves plans, found or stated.
+    def with_symmetry_used(self, demonstrations: Demonstrations) -> Demonstrations:
+        """Return what it was fitted to, with the symmetry by which it moves plans, stated or found.
 
         An adapter starts with these, so that it knows how plans are made.
         """
@@ -275,6 +275,10 @@ class Wrapper(Generator):
         super().fit(demonstrations, seed=seed, progress=progress)
         self.remarks += self.generator.remarks
         return self
+
+    def with_symmetry_used(self, demonstrations: Demonstrations) -> Demonstrations:
+        """Return them with the symmetry that the wrapped one uses."""
+        return self.generator.with_symmetry_used(demonstrations)
 
     def check_savable(self) -> None:
         """Do nothing if the wrapped generator can be saved; see `Generator.check_savable`."""

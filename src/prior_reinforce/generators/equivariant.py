@@ -58,8 +58,8 @@ class Equivariant(Wrapper):
         super().__init__(generator)
         self._finds = finds
 
-    def shown(self, demonstrations: Demonstrations) -> Demonstrations:
-        """Return them with the symmetry that was found, or theirs; see `Generator.shown`."""
+    def with_symmetry_used(self, demonstrations: Demonstrations) -> Demonstrations:
+        """Return them with theirs, or that which was found; see `Generator.with_symmetry_used`."""
         found = demonstrations.symmetry is None and self._anchors is not None
         return demonstrations.with_symmetry(self._anchors.symmetry) if found else demonstrations
 

@@ -85,7 +85,7 @@ class InUse:
         another session have used the adapter.
         """
         adapter, told = self.adapter, list(_told(state, self.names[0]))
-        shown = self.generator.shown(self.demonstrations)
+        shown = self.generator.with_symmetry_used(self.demonstrations)
         keys = [adapter.first_key(shown)]
         for what, arguments in told:
             keys.append(next_key(keys[-1], what, *arguments))
