@@ -164,13 +164,15 @@ def test_a_person_at_the_terminal_is_asked_which_link_is_the_flange(run, tmp_pat
     so101 = Urdf("so101", [*arm(["a", "b", "wrist"]), J("gripper", "jaw")])
     (tmp_path / "arm.urdf").write_text(so101.text())
     monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    questions = []
     monkeypatch.setattr(
         "prior_reinforce.commands.workspace.answer_to",
-        lambda question: "none" if "object" in question else "",
+        lambda question: questions.append(question) or ("none" if "object" in question else ""),
     )
     status, out, err = run("new", tmp_path / "w", "--robot", tmp_path / "arm.urdf")
     assert status == 0, err
     assert "--tip: wrist_link" in out
+    assert "Ctrl-C" in questions[0]  # what is no link cannot be typed
     with Workspace(tmp_path / "w") as workspace:
         assert workspace.manifest.robot.joint_names == ("a", "b", "wrist")
 

@@ -97,10 +97,9 @@ class New(NewWorkspace):
             return self
         try:
             self.described(Path(self.robot))
+            return self
         except UnclearFlangeError as error:
             unclear = error
-        else:
-            return self
         print(unclear)
 
         def read(said: str) -> str:
@@ -109,7 +108,7 @@ class New(NewWorkspace):
             return tip
 
         proposed = f" [{unclear.proposed}]" * bool(unclear.proposed)
-        question = f"link that is the flange{proposed}: "
+        question = f"link that is the flange, or Ctrl-C to run new with other options{proposed}: "
         return replace(self, tip=until_read(partial(answer_to, question), read))
 
     def _asked(self) -> New:
