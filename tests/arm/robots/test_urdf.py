@@ -1,6 +1,8 @@
 """A URDF gives the limits and kinematics that MuJoCo finds in it, and says what it lacks."""
 
 import re
+import subprocess
+import sys
 from xml.etree import ElementTree
 
 import mujoco
@@ -526,6 +528,11 @@ def test_a_flange_metres_behind_the_last_joint_is_in_another_unit(tmp_path):
 SIN_X, COS_X, SIN_Z, COS_Z = np.sin(0.15), np.cos(0.15), np.sin(-0.1), np.cos(-0.1)
 X_Y_Z_W = (SIN_X * COS_Z, SIN_X * SIN_Z, COS_X * SIN_Z, COS_X * COS_Z)
 QUATERNION = 'rpy="0.3 0 -0.2"', f'quat_xyzw="{" ".join(map(str, X_Y_Z_W))}"'
+
+
+def test_a_urdf_is_read_without_loading_scipy():
+    program = "import sys, prior_reinforce.arm.robots.urdf; print('scipy' in sys.modules)"
+    assert subprocess.check_output([sys.executable, "-c", program], text=True).strip() == "False"
 
 
 def test_a_quaternion_turns_as_roll_pitch_and_yaw_do(tmp_path):

@@ -20,7 +20,6 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from prior_reinforce.arm.robots.limits import ENDLESS
 from prior_reinforce.errors import ConfigurationError, FileFormatError
@@ -287,6 +286,8 @@ class Joint:
                 f"needs a quat_xyzw of length 1, and it has {math.hypot(*quaternion):.3g}; write "
                 "x y z w of the turn"
             )
+        from scipy.spatial.transform import Rotation
+
         return np.asarray(Rotation.from_quat(quaternion).as_matrix())
 
     def axis(self) -> tuple[float, float, float]:
