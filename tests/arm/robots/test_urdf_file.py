@@ -16,6 +16,8 @@ UR.append("wrist_3_joint")
 PANDA = [f"panda_joint{i}" for i in range(1, 8)]
 SEVEN = [f"joint_{i}" for i in range(1, 8)]
 SIX = [f"joint{i}" for i in range(1, 7)]
+NAMED = ("dont_collapse", "joint_properties", "deceleration", "stiffness")
+"""Words that are passed over, and named."""
 SO = ["shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll"]
 WX = ["waist", "shoulder", "elbow", "wrist_angle", "wrist_rotate"]
 YAWED = {"rpy": (0.0, 0.0, -0.2)}
@@ -246,6 +248,8 @@ READ = [
         name='name="a" xmlns:drake="http://drake.mit.edu"',
     ),
     Urdf("acceleration and jerk", arm(SIX, limit='acceleration="8" deceleration="8" jerk="400"')),
+    Urdf("deceleration alone", arm(SIX, limit='deceleration="8"')),
+    Urdf("another word in <limit>", arm(SIX, limit='stiffness="3"')),
     Urdf("drake's namespace for all", arm(SIX), name='name="a" xmlns="http://drake.mit.edu"'),
     Urdf("soft limits", arm(SIX, more=SOFT)),
     Urdf("dynamics and calibration", arm(SIX, more=f'{MOTOR}<calibration rising="0.0"/>')),
@@ -401,7 +405,7 @@ REFUSED = [
             change=(f"<{part} ", f'<{part} frame="world" '),
             says=f"joint1 has an unknown frame in <{part}>; take it out",
         )
-        for part in ("origin", "axis", "limit")
+        for part in ("origin", "axis")
     ],
     Urdf("a gripper alone", fingers("base_link", "revolute"), says="--tip"),
     Urdf(
@@ -462,7 +466,7 @@ def test_a_description_is_read_with_the_right_values(run, tmp_path, given):
     np.testing.assert_allclose(
         tool_tip(robot.chain, q), described.place(positions, base), atol=1e-9
     )
-    unknown = [word for word in ("dont_collapse", "joint_properties") if word in given.text()]
+    unknown = [word for word in NAMED if word in given.text()]
     assert all(word in out for word in unknown)  # what is passed over is named
 
 

@@ -42,9 +42,9 @@ _ATTRIBUTES = {
     "safety_controller": {"soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"},
 }
 """What a joint may say that matters to its motion."""
-_PLACING = ("origin", "axis", "limit")
+_PLACING = ("origin", "axis")
 """What says where a joint is and how it moves: an unknown attribute may say that otherwise."""
-_PASSED_OVER = ("deceleration",)
+_PASSED_OVER = {"deceleration"}
 """Attributes of newer URDFs that no rule here reads."""
 _ELSEWHERE = ("dynamics", "calibration")
 """What else URDF lets it say."""
@@ -140,9 +140,9 @@ class Joint:
             found[tag] = attributes
         for tag, attributes in found.items():
             words = _ATTRIBUTES.get(tag, ())
-            for key in attributes.keys() - words:
+            for key in attributes.keys() - words - _PASSED_OVER:
                 self._refuse_slip(key, words - attributes.keys() if words else (), f" in <{tag}>")
-                if tag in _PLACING and key not in _PASSED_OVER and "}" not in key:
+                if tag in _PLACING and "}" not in key:
                     raise self.error(
                         f"has an unknown {key} in <{tag}>; take it out, or say it in "
                         f"{', '.join(sorted(words))}"
