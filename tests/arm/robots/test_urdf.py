@@ -495,9 +495,39 @@ def test_what_follows_a_held_joint_follows_it(tmp_path):
     with pytest.raises(FileFormatError, match=r"--base roof .*, or --hold lower=0 if"):
         read_urdf(path)
     assert read_urdf(path, hold={"lower": 0.2}).held["third"] == pytest.approx(0.25)
+    with pytest.raises(ConfigurationError, match=r"third follows upper .*hold lower where"):
+        read_urdf(path, hold={"third": 0.25})
     path.write_text(path.read_text().replace('"1.5"', '"4"'))
     with pytest.raises(ConfigurationError, match=r"to 1.15, and its range is -0.1 to 0.6"):
         read_urdf(path, hold={"lower": 0.3})
+
+
+@pytest.mark.parametrize("multiplier", ["-1", "x"])
+def test_what_follows_behind_the_flange_may_be_wrong(tmp_path, multiplier):
+    more = f'<mimic joint="finger_joint" multiplier="{multiplier}"/>'
+    fingers = [
+        J("finger_joint", "finger", of="tool0", low=0.0, high=0.8),
+        J("mim", "other", of="tool0", low=0.0, high=0.8, more=more),
+    ]
+    path = tmp_path / "arm.urdf"
+    path.write_text(Urdf("a", [*arm(["a", "b", "c"]), fixed("t", "tool0"), *fingers]).text())
+    assert read_urdf(path, hold={"finger_joint": 0.4}).joint_names == ("a", "b", "c")
+    with pytest.raises(ConfigurationError, match="joint mim "):
+        read_urdf(path, "other", hold={"finger_joint": 0.4})
+
+
+@pytest.mark.parametrize("hold", [None, {"s": 0.0}])
+@pytest.mark.parametrize(("follows", "mend"), [("s", "s"), ("zz", "s"), ("t", "t")])
+def test_a_follower_that_nothing_leads_is_corrected_in_the_file(tmp_path, follows, mend, hold):
+    path = tmp_path / "arm.urdf"
+    slides = [
+        J("s", "s_link", "prismatic", more=f'<mimic joint="{follows}"/>'),
+        J("t", "t_link", "prismatic", more='<mimic joint="s"/>'),
+    ]
+    path.write_text(Urdf("lift", [*slides, *arm(["a", "b", "c"])]).text())
+    with pytest.raises(ConfigurationError, match=f"correct .*<mimic> of {mend}") as refused:
+        read_urdf(path, hold=hold)
+    assert "hold" not in str(refused.value)
 
 
 def test_a_base_that_drives_and_turns_is_none_of_the_arm(tmp_path):

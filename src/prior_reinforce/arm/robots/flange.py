@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
 from typing import NoReturn
 
@@ -44,7 +44,7 @@ def joints_to(link: str, moving: Mapping[str, Joint], base: str | None = None) -
 
 
 def fixed_behind(
-    link: str, links: Sequence[str], moving: Mapping[str, Joint], hold: Mapping[str, float]
+    link: str, links: Sequence[str], moving: Mapping[str, Joint], hold: Collection[str]
 ) -> list[str]:
     """Return the links that stand still against a link, and these, from it outwards."""
     rigid = {link: None}
@@ -55,7 +55,7 @@ def fixed_behind(
 
 
 def moved_behind(
-    link: str, links: Sequence[str], moving: Mapping[str, Joint], hold: Mapping[str, float]
+    link: str, links: Sequence[str], moving: Mapping[str, Joint], hold: Collection[str]
 ) -> list[str]:
     """Return the names of the joints behind a link that move by themselves."""
     inside, found = {link}, list[str]()
@@ -98,7 +98,7 @@ def find_flange(
     links: Sequence[str],
     moving: Mapping[str, Joint],
     base: str,
-    hold: Mapping[str, float],
+    hold: Collection[str],
     meshes: Mapping[str, str],
 ) -> str:
     """Return the link that is the flange of the one arm behind the base.
@@ -124,7 +124,7 @@ class _Tree:
         links: Sequence[str],
         moving: Mapping[str, Joint],
         base: str,
-        hold: Mapping[str, float],
+        hold: Collection[str],
         meshes: Mapping[str, str],
     ) -> None:
         self.links, self.moving, self.hold = links, moving, hold
@@ -328,7 +328,7 @@ def _rank(link: str) -> int:
     return len(_TIPS) if found is None else _TIPS.index(found[1])
 
 
-def _still(joint: Joint, hold: Mapping[str, float]) -> bool:
+def _still(joint: Joint, hold: Collection[str]) -> bool:
     return joint.type == "fixed" or joint.name in hold
 
 

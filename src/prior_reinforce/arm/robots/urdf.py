@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,7 @@ from prior_reinforce.arm.robots.flange import (
     moved_behind,
 )
 from prior_reinforce.arm.robots.limits import ENDLESS, PerJoint, RobotLimits
-from prior_reinforce.arm.robots.urdf_file import LARGEST, TURNING, TYPES, Joint, read_joints
+from prior_reinforce.arm.robots.urdf_file import BESIDE, LARGEST, TURNING, TYPES, Joint, read_joints
 from prior_reinforce.errors import ConfigurationError, FileFormatError
 from prior_reinforce.plans.kinematics import UPRIGHT, Chain, Pose, rotation
 from prior_reinforce.wording import listed
@@ -64,22 +64,25 @@ def read_urdf(
     """
     name, joints, links, meshes = read_joints(path)
     moving, said, unsaid = {joint.child: joint for joint in joints}, dict(hold or {}), tip is None
+    named = {joint.name: joint for joint in joints}
     try:
-        hold = _held(joints, said)
+        still = _still(named, said)
         for link in {tip, base} - {None, *links}:
             few = ", ".join(links[:_MOST_NAMED])
             raise ConfigurationError(f"it has no link {link!r}; it has {few}")
         if tip is None:
-            tip = find_flange(links, moving, links[0] if base is None else base, hold, meshes)
-        chain = joints_to(tip, moving, base)
+            tip = find_flange(links, moving, links[0] if base is None else base, still, meshes)
+        chain, way = joints_to(tip, moving, base), joints_to(tip, moving)
         if base is not None and (not chain or chain[0].parent != base):
             raise ConfigurationError(f"link {base} is not on the way to {tip}; say another --base")
+        # What stands behind the flange is none of the arm's, and may be wrong.
+        hold = {joint.name: _place(joint, named, said) for joint in way if joint.name in still}
         turning = [joint for joint in chain if joint.name not in hold and joint.type in TURNING]
-        _refuse_other(chain, turning, joints, tip, hold)
+        _refuse_other(chain, turning, named, tip, hold)
         velocity, acceleration, jerk = (_largest(key, turning) for key in LARGEST)
         assert velocity is not None  # it is needed
         lower, upper = np.array([joint.range() for joint in turning]).T
-        upright = _upright(joints_to(chain[0].parent, moving), hold)
+        upright = _upright(way[: way.index(chain[0])], hold)
         kinematics = _chain(chain, hold, upright)
     except (ConfigurationError, FileFormatError) as error:
         error.args = (f"{path}: {error}",)
@@ -89,9 +92,9 @@ def read_urdf(
     source += "".join(f", {name} held at {position:g}" for name, position in said.items())
     source += ", soft limits too" * any("safety_controller" in joint.parts for joint in turning)
     # A convention's link is the flange, and what is fixed behind it a tool.
-    behind = fixed_behind(tip, links, moving, hold) if unsaid and not is_conventional(tip) else []
+    behind = fixed_behind(tip, links, moving, still) if unsaid and not is_conventional(tip) else []
     source += f"; fixed behind it: {listed(behind)} (--tip NAME takes one)" * bool(behind)
-    tools = moved_behind(turning[-1].child, links, moving, hold) if unsaid else []
+    tools = moved_behind(turning[-1].child, links, moving, still) if unsaid else []
     source += f"; moved behind it: {listed(tools, most=3)}" * bool(tools)
     capped = [j for j in turning if j.type == "continuous" and 0 < np.ptp(j.ends()) < 2 * ENDLESS]
     over = [f"lower and upper of joint {joint.name}, which is continuous" for joint in capped]
@@ -141,37 +144,81 @@ def _first_origin(arm: RobotLimits) -> Pose:
     return arm.chain.origins[0]
 
 
-def _held(joints: Sequence[Joint], hold: Mapping[str, float]) -> dict[str, float]:
-    """The joints that stand still, and where: those of `hold`, and what follows them (<mimic>).
+def _still(named: Mapping[str, Joint], said: Mapping[str, float]) -> set[str]:
+    """Names of the joints that stand still: as is said, or as what they follow (<mimic>).
 
     Raises:
-        ConfigurationError: There is no such joint, or it cannot stand there.
+        ConfigurationError: There is no such joint, or it cannot stand where it is said to.
     """
-    if unknown := hold.keys() - {joint.name for joint in joints}:
+    if unknown := said.keys() - named.keys():
         raise ConfigurationError(f"it has no joint {min(unknown)!r} to hold")
-    held = {j.name: hold[j.name] for j in joints if j.name in hold and j.mimics is None}
-    while follow := [j for j in joints if j.mimics in held and j.name not in held]:
-        held |= {joint.name: joint.followed(held[joint.mimics or ""]) for joint in follow}
-    for joint in joints:
-        if joint.name in hold or joint.name in held:
-            joint.check_held(hold.get(joint.name), held.get(joint.name))
-    return held
+    for name in said:
+        _place(named[name], named, said)
+    still = set(said)
+    while follow := {name for name, joint in named.items() if joint.mimics in still} - still:
+        still |= follow
+    return still
+
+
+def _place(joint: Joint, named: Mapping[str, Joint], said: Mapping[str, float]) -> float:
+    """Where a joint stands still, in [rad] or [m]: as is said, or where what it follows takes it.
+
+    Raises:
+        ConfigurationError: It does not stand still, or cannot there.
+    """
+    leader, *followers = _led(joint, named)
+    if leader.name not in said:
+        raise joint.error(
+            f"follows {joint.mimics} (<mimic>), and does not stand still; hold {leader.name} where "
+            "both do"
+        )
+    position = said[leader.name]
+    leader.check_held(position)
+    for follower in followers:
+        position = follower.followed(position)
+        if follower.nearest(position) != position:
+            low, high = follower.places()
+            raise follower.error(
+                f"follows {follower.mimics} to {position:.4g}, and its range is {low:.4g} to "
+                f"{high:.4g}; hold {leader.name} elsewhere"
+            )
+        if abs(said.get(follower.name, position) - position) > BESIDE:
+            raise follower.error(
+                f"follows {follower.mimics} to {position:.4g}; take it out of --hold, or say that"
+            )
+    return position
+
+
+def _led(joint: Joint, named: Mapping[str, Joint]) -> list[Joint]:
+    """Return the joints from the one that leads it, and follows none, to itself.
+
+    Raises:
+        ConfigurationError: It follows one that there is not, or in a circle.
+    """
+    found = [joint]
+    while (followed := found[0].mimics) is not None:
+        if followed not in named or named[followed] in found:
+            raise joint.error(
+                f"follows {joint.mimics} (<mimic>), and no joint leads it; correct the joint in "
+                f"the <mimic> of {found[0].name} in the file"
+            )
+        found.insert(0, named[followed])
+    return found
 
 
 def _refuse_other(
     chain: Sequence[Joint],
     turning: Sequence[Joint],
-    joints: Sequence[Joint],
+    named: Mapping[str, Joint],
     tip: str,
-    hold: Mapping[str, float],
+    hold: Collection[str],
 ) -> None:
     """Refuse a chain without turning joints, or with others that are not held."""
     if not turning:
         raise FileFormatError(f"no joint turns between the base and {tip}; say --tip")
     other = [j for j in chain if j.type in TYPES[3:] and j.name not in hold]
-    arms = {joint.name for joint in turning}
     for joint in [*turning, *other]:
-        if joint.mimics is not None and (joint.mimics in arms or joint in turning):
+        if joint.mimics is not None and (joint in turning or _led(joint, named)[0] in turning):
             raise joint.error(
                 f"follows another (<mimic> of {joint.mimics}), and so is no joint of its own; say "
                 "a --tip before it, or, where the arm goes on behind it, --robot none: no limits "
@@ -194,10 +241,7 @@ def _refuse_other(
         base, still = behind[0].child, [*other, behind[0]]
     # What carries the arm may stand still; an arm's own joints do not.
     says += [f"--base {base} for what is behind it"] * (bool(behind) and not before)
-    named = {joint.name: joint for joint in joints}
-    for _ in other:  # what is followed may follow as well
-        still = [named.get(joint.mimics or "", joint) for joint in still]
-    leaders = dict.fromkeys(still)
+    leaders = dict.fromkeys(_led(joint, named)[0] for joint in still)
     holds = "--hold " + " ".join(f"{joint.name}={joint.nearest(0.0):.4g}" for joint in leaders)
     raise FileFormatError(
         f"{other[-1].name} is {other[-1].type}, and arms of turning joints are known only; say "

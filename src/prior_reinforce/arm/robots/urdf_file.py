@@ -61,7 +61,7 @@ _FASTEST, _FARTHEST = 30.0, 10.0
 the market; a lost decimal point is mostly more."""
 LARGEST = {"velocity": _FASTEST, **RATES}
 """What no joint does, in rad and s."""
-_BESIDE = 0.01
+BESIDE = 0.01
 """By how much a joint may be held beyond its range, [rad] or [m] (ours): two written digits."""
 _WEB_PAGE = (b"<!doctype html", b"<html")
 """Beginnings of what a browser saves in the place of a file, in lower case."""
@@ -195,31 +195,8 @@ class Joint:
         multiplier, offset = (self.number("mimic", key) for key in ("multiplier", "offset"))
         return (1.0 if multiplier is None else multiplier) * position + (offset or 0.0)
 
-    def check_held(self, said: float | None, stands: float | None) -> None:
-        """Refuse a place, [rad] or [m], at which it cannot stand still.
-
-        Args:
-            said: What a person says of it, if anything.
-            stands: Where it is: what was said, or where what it follows takes it.
-        """
-        if stands is None:
-            raise self.error(
-                f"follows {self.mimics} (<mimic>), and does not stand still; hold {self.mimics} "
-                "where both do"
-            )
-        position = stands
-        if self.mimics is not None:
-            if self.nearest(position) != position:
-                low, high = self.places()
-                raise self.error(
-                    f"follows {self.mimics} to {position:.4g}, and its range is {low:.4g} to "
-                    f"{high:.4g}; hold {self.mimics} elsewhere"
-                )
-            if said is not None and abs(said - position) > _BESIDE:
-                raise self.error(
-                    f"follows {self.mimics} to {position:.4g}; take it out of --hold, or say that"
-                )
-            return
+    def check_held(self, position: float) -> None:
+        """Refuse a place that was said, [rad] or [m], at which it cannot stand still."""
         if self.type not in (*TURNING, "prismatic"):
             if position:
                 raise self.error(f"is {self.type}, and can be held at 0 alone")
@@ -253,7 +230,7 @@ class Joint:
         That is the place itself where it is beyond the range by no more than rounding.
         """
         low, high = self.places()
-        held = low - _BESIDE <= position <= high + _BESIDE
+        held = low - BESIDE <= position <= high + BESIDE
         return position if held else min(max(position, low), high)
 
     def pose(self, position: float | None) -> np.ndarray:
