@@ -230,6 +230,36 @@ def test_more_recordings_are_appended(run, folder, tmp_path):
     assert "demonstration 4 so far and 0 are one motion" in err
 
 
+@pytest.mark.parametrize(
+    ("columns", "named", "units", "rests_at"),
+    [
+        (("swivel_joint", "boom_joint"), (), ("rad", "rad"), 1.2),
+        (("a", "b", "A", "B"), (), ("rad",) * 4, 1.2),
+        (("slew_speed [rad]", "boom_joint [rad]"), (), ("rad", "rad"), 1.2),
+        (("boom_joint_vel", "boom_joint"), ("boom_joint_vel", "boom_joint"), ("rad/s", "rad"), 0),
+    ],
+)
+def test_the_plan_of_a_joint_ends_where_it_was_and_that_of_a_speed_at_0(
+    run, tmp_path, monkeypatch, columns, named, units, rests_at
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own").mkdir()
+    for k, n in enumerate((40, 60, 60, 60)):  # the first is held at its end
+        phase = np.linspace(0.0, 1.0, n)
+        q = (phase**2 * (3 - 2 * phase))[:, None] * (1.2 + 0.1 * k * np.arange(len(columns)))
+        table = np.column_stack([np.arange(n) / 50, q])
+        header = ",".join(("t", *columns))
+        np.savetxt(f"own/{k}.csv", table, delimiter=",", header=header, comments="")
+    write_outcomes(tmp_path / "own", {str(k): [0.5 + 0.1 * k, 0.05 * k**2] for k in range(4)})
+    names = ("--action-names", *named) if named else ()
+    assert run("new", "crane", *names, "--robot", "none", "--dt", "0.02", "--no-box")[0] == 0
+    status, _, err = run("import", "crane", "own", "--no-trim")
+    assert status == 0, err
+    with Workspace("crane") as workspace:
+        assert workspace.demonstrations.format.units == units
+        assert workspace.demonstrations.plans[0, -1, 0] == pytest.approx(rests_at)
+
+
 def test_episodes_with_odd_names_are_printed_as_text(run, folder, tmp_path, monkeypatch):
     rows = [
         f"{t},{q},{q},a\x1b[2J{i}" for i in range(4) for t, q in zip(T, T * (i + 1), strict=True)

@@ -7,6 +7,8 @@ from prior_reinforce.plans.channels import (
     increments,
     is_coordinate,
     is_increment,
+    is_of_base,
+    is_of_finger,
     is_of_pose,
     is_of_tool,
     is_tool_state,
@@ -27,7 +29,11 @@ from prior_reinforce.plans.channels import (
         (Kind.ANGLE, "gripper_yaw Gripper/Roll index_finger_mcp linear_angle"),
         (Kind.TOOL, "gripper finger_joint1 robotiq_pos pressure 夹爪 linear_gripper Greiferweite"),
         (Kind.SLIDE, "E1 d3 scara_d3 axis_E1 rail ext_axis_1 linearAxis slider prismatic_joint"),
-        (Kind.UNKNOWN, "foo crank spring x z level travel tau_d_1"),
+        (Kind.UNKNOWN, "foo crank spring x z level travel tau_d_1 velvet novelty_score marvel_x"),
+        (Kind.UNKNOWN, "ddq_d_0 swivel bevel_1 thumb_1 pumpkin tongue left_knuckle"),
+        (Kind.ANGLE, "swivel_joint shovel_joint wrist_twist omega7_joint1 thumb_joint_0"),
+        (Kind.ANGLE, "joint_d_1 theta_d_0 joint_e_1 arm_d_1 head_d_2 tau_J_d_0 wrist_d_1"),
+        (Kind.SLIDE, "kuka_E1 d_1 scara_d_3 axis_e_1"),
         (Kind.PLACE, "tool.x tool.y"),
         (Kind.PLACE, "X_axis Y_axis Z_axis"),
         (Kind.PLACE, "gripper_tip_x gripper_tip_y gripper_tip_z"),
@@ -38,15 +44,18 @@ from prior_reinforce.plans.channels import (
         (Kind.TURN_RATE, "wz dq0 joint1_vel theta.vel qd_3 joint_velocity_0"),
         (Kind.TURN_RATE, "actual_TCP_speed_3 tcp_angular_vel"),
         (Kind.ANGLE, "dyaw drx"),
-        (Kind.TOOL, "gripper_vel magnet trigger pump drive_joint tool_do thumb_1 suction"),
+        (Kind.TOOL, "gripper_vel magnet trigger pump drive_joint tool_do tongs suction"),
         (Kind.LENGTH, "dpos_x x_delta Δx inc_y world_vector_0 gripper_dx"),
         (
             Kind.VELOCITY,
-            "velocity_x vel_y linear_velocity_z gripper_vx TCPSpeed",
+            "velocity_x vel_y linear_velocity_z gripper_vx TCPSpeed cmd_vel/linear/x twist.linear.x"
+            " velocity_linear_0 lin_vel_0 linvel_1 velx",
         ),
         (
             Kind.TURN_RATE,
-            "vel_joint4 vitesse_joint4 Gelenkgeschwindigkeit_1 速度_joint4 dq dQ",
+            "twist.angular.z cmd_vel/angular/z anglevel_1 angvel_z rotvel_x elbowvel qvel_0"
+            " VelJ1 thumb_vel omega_1 vel_joint4 vitesse_joint4"
+            " Gelenkgeschwindigkeit_1 速度_joint4 dq dQ",
         ),
         (
             Kind.TURN_RATE,
@@ -89,8 +98,19 @@ def test_a_name_says_what_a_channel_is(kind, names):
         ),
         (
             says_no_position,
-            "dyaw drx dx gripper_dyaw world_vector_0 joint4.torque ddq_1 tcp_pose left/d_joint1",
-            "joint4 q_1 level_joint4 travelled dynamixel_1 gripper",
+            "dyaw drx dx gripper_dyaw world_vector_0 joint4.torque ddq_1 tcp_pose left/d_joint1 dQ"
+            " linacc_1 twist.linear.x",
+            "joint4 q_1 level_joint4 travelled dynamixel_1 gripper swivel_joint wrist_twist",
+        ),
+        (
+            is_of_finger,
+            "fr3_finger_ left/gripper. Gripper_ leftGripper_ thumb_ arm_finger2_",
+            "ur5e_robotiq/ panda_hand/ iiwa_wsg50/ ur5_suction_ panda_with_claw/",
+        ),
+        (
+            is_of_base,
+            "base_pose /base_pose/pose/position/x odom base_heading swivel_base",
+            "base_velocity base_twist base_force_x base_acc_x base_joint robotiq_base baseline",
         ),
     ],
 )
@@ -114,6 +134,19 @@ def test_what_is_called_like_an_increment_beside_its_own_is_a_rate(names, rates)
     assert zero_at_rest(names, units) == [*range(own, len(names))]
     assert increments(names, ["m"] * len(names)) == ()
     assert increments(names[own:], ["m"] * len(rates)) == (*range(len(rates)),)
+
+
+@pytest.mark.parametrize("names", ["a b A B", "x y z X Y Z", "q1 Q1", "d D"])
+def test_names_that_differ_by_case_alone_are_no_rates(names):
+    found = kinds(names.split())
+    assert {Kind.VELOCITY, Kind.TURN_RATE}.isdisjoint(found)
+    assert zero_at_rest(names.split(), [None] * len(found)) == []
+
+
+def test_what_is_in_a_unit_of_angle_is_not_0_at_rest_whatever_its_name():
+    names = ["slew_speed", "tilt_speed", "joint_vel", "dx"]
+    assert zero_at_rest(names, ["rad", "deg", "rad/s", "m"]) == [2, 3]
+    assert zero_at_rest(names, [None] * 4) == [0, 1, 2, 3]
 
 
 def test_places_and_joints_are_told_apart_by_what_x_and_y_are_of():
@@ -159,6 +192,7 @@ def test_speeds_and_ways_have_units_of_their_own():
     each = (Kind.LENGTH, Kind.VELOCITY, Kind.TURN_RATE)
     assert [kind.usual_unit(300.0) for kind in each] == ["m", "m/s", "rad/s"]
     assert one_for_all("deg", ["dx", "dq0", "dyaw"]) == [None, None, "deg"]
+    assert one_for_all("deg", ["thumb_joint_0", "index_joint_0"]) == ["deg", "deg"]
 
 
 def test_one_unit_is_of_all_that_can_be_in_it():

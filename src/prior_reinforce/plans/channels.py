@@ -53,25 +53,15 @@ _INCREMENT = re.compile(
 )
 """What an increment is called, in `_words`; `world_vector` is that of RT-1 (Open X-Embodiment), and
 `delta_1` a joint of a delta robot."""
-_SPEED = r"((?<!le|ra)vel(?!op)|speed|geschwind|vitesse|速|omega)"
-"""What a speed is called; `level` and `travel` are none."""
 _LOAD = "force|torque|wrench|effort"
-_NO_POSITION = re.compile(
-    rf"{_SPEED}|{_LOAD}|accel|jerk|tau|current|temperature|cartesian|tcp|pose"
-    r"|delta|δ|∆|increment|relative|residual|derivative|beschleun|moment|couple|力矩|扭矩|トルク"
-    r"|增量|増分|(^|[^a-z])(acc|d+q|qd+|q_?dot|dot|temp|tool|ee|eef|rate|inc|incr|diff|rel|err"
-    r"|error|offset|step|change|noise|std|var|gain|k[pid])($|[^a-z])"
-    r"|(^|[/.:])(d+|v|dv|dt)($|[^a-z])",
-    re.IGNORECASE,
-)
-"""Words of rates, torques, increments and whatever else is no joint position. Ours, and broad on
-purpose: a column that is not taken for a joint's is named, and can be renamed."""
 _TOOL = (
     r"grip|jaw|finger|width|claw|opening|suction|robotiq|wsg|greifer|pince|夹爪|夹具|vacuum|valve"
-    r"|magnet|trigger|pump|knuckle|thumb|pinch|tong|drive joint|tool d[io]\b"
+    r"|magnet|trigger|\b(pump|pinch|tong)s?\b|drive joint|tool d[io]\b"
 )
 """Words of a gripper or another tool, in `_words`: `drive_joint` is the xArm's gripper."""
-_OF_TOOL = re.compile(rf"{_TOOL}|\bhand( \d+)?$")
+_OF_TOOL = re.compile(rf"{_TOOL}|knuckle|thumb|\bhand( \d+)?$")
+_OF_BASE = r"\b(base|platform|odom(etry)?|rover|agv)\b"
+"""What moves below an arm."""
 _OF_COORDINATE = re.compile(r"(?<!\b[qr] )\bd?[xyz]( \d+| delta)?$|world vector")
 _OF_ATTITUDE = re.compile(rf"{ATTITUDE}|\brot|\bangle")
 _IN_SPACE = rf"\b([dvr]?[xyz]|q[wxyz])\b|{ATTITUDE}|\b(rot\w*|pose) (\w+ )*\d|\bd?({_ANGLES})\b"
@@ -88,14 +78,35 @@ _WITHIN = (
 )
 """Words of angles: that outweigh a gripper's, that stand alone, or within others (`Handgelenk`)."""
 _RAIL = r"rail|track|linear|slider?|gantry|prismatic|carriage"
-_SLIDE = r"(^|\b(?!d?q|tau|ee|elbow)\w+ )[de] \d"
-_ALONG = rf"[xyz]|{_RAIL}|belt|conveyor|(tcp|eef?)(?!.* [3-5]$)"
+_SLIDE = r"(^|\bscara )[de] ?\d|\baxis e \d|(^|\b(?!d*q|tau|theta|ee|elbow)\w+ )[de]\d"
+"""`d3` and `E1`; but `joint_d_3` and Franka's `tau_J_d_3` are what is desired."""
+_STRAIGHT = r"[xyz]|lin(ear)?"
+_ALONG = rf"{_STRAIGHT}|{_RAIL}|belt|conveyor|(tcp|eef?)(?!.* [3-5]$)"
 """What goes at m/s; of six numbered speeds of a tool, `actual_TCP_speed_0` (UR), the last turn."""
+_OMEGA = r"omega(?! \d+ joint)"
+_SPEED = (
+    rf"(\b([a-z]|d*q|\w*({_WITHIN}|{_RAIL})|ang(ular)?|lin|trans|tip|tcp|eef?|wheel|motor)?"
+    rf"vel(s|o|cmd|ang|{_STRAIGHT})?\b|veloc|speed|geschwind|vitesse|速|{_OMEGA}"
+    rf"|\btwist(?= (ang(ular)?|{_STRAIGHT})\b))"
+)
+"""What a speed is called; `swivel`, `shovel`, `wrist_twist` and `omega7_joint1` are joints."""
+_ACCELERATION = r"accel|\b(ang|lin)?acc\b|jerk|beschleun"
+_NO_POSITION = re.compile(
+    rf"{_SPEED}|{_LOAD}|{_ACCELERATION}|tau|current|temperature|cartesian|tcp|pose"
+    r"|delta|increment|relative|residual|derivative|moment|couple|力矩|扭矩|トルク|增量|増分"
+    r"|\b(d+ ?q|qd+|q ?dot|dot|temp|tool|ee|eef|rate|inc|incr|diff|rel|err|error|offset|step"
+    r"|change|noise|std|var|gain|k ?[pid])\b"
+)
+"""Words of rates, torques, increments and whatever else is no joint position, in `_words`. Ours,
+and broad on purpose: a column that is not taken for a joint's is named, and can be renamed."""
+_DERIVED = re.compile(r"(^|[/.:])(d+|v|dv|dt)($|[^a-z])", re.IGNORECASE)
+"""What a derivative is called before a joint: `d_joint1`; `q_d` is desired."""
 _BY_NAME = (
     (r"\bd ?[xyz]$|torso ?lift", Kind.LENGTH),
-    (rf"\bw[xyz]$|omega|\b(dq|qd|d q|q ?dot)\b|\b({_ANGLES}|turn) rate\b", Kind.TURN_RATE),
-    (rf"\b(ang|rot).*{_SPEED}|{_SPEED}.*\bang", Kind.TURN_RATE),
-    (rf"\bv[xyz]$|\b({_ALONG}) ?{_SPEED}|{_SPEED}\w* ([xyz]|lin)\b", Kind.VELOCITY),
+    (rf"\bw[xyz]$|{_OMEGA}|\b(dq|qd|d q|q ?dot)\b|\b({_ANGLES}|turn) rate\b", Kind.TURN_RATE),
+    (rf"\b(ang|rot)(.*{_SPEED}|\w*vels?\b)|{_SPEED}.*\bang", Kind.TURN_RATE),
+    (rf"\bv[xyz]$|\b({_ALONG})( ?{_SPEED}|vels?\b)", Kind.VELOCITY),
+    (rf"{_SPEED}\w* ({_STRAIGHT})\b|\bvel({_STRAIGHT})\b", Kind.VELOCITY),
     (_SPEED, Kind.TURN_RATE),
     (r"quat(ernion)? \d$", Kind.QUATERNION),
     (r"(rot ?vec|axis ?angle) \d$", Kind.ROTATION),
@@ -167,9 +178,9 @@ def kinds(names: Sequence[str]) -> tuple[Kind, ...]:
 
 
 def _words(name: str) -> str:
-    """Return the words of a name in lower case, with blanks between: `joint 1 delta x`."""
+    """Return the words of a name in lower case, blanks between: `joint 1 delta x`, `rail e1`."""
     apart = re.sub("(?<=[a-z])(?=[A-Z])", " ", re.sub("[Δ∆δ]", " delta ", name))
-    return " ".join(re.findall(r"[^\W\d_]+|\d+", apart.lower()))
+    return " ".join(re.findall(r"(?<![^\W\d_])[de]\d+|[^\W\d_]+|\d+", apart.lower()))
 
 
 def is_increment(name: str) -> bool:
@@ -187,7 +198,7 @@ def _rates_beside(names: Sequence[str]) -> dict[str, str]:
     """Rates called like increments, as exports and states have, and of what: `dx` beside `x`."""
     own = {name.lower(): name for name in names}
     each = [(name, name.lower().removeprefix(d)) for d in ("d_", "d") for name in names]
-    return {name: own[of] for name, of in each if own.get(of, name) != name}
+    return {name: own[of] for name, of in each if of in own and of != name.lower()}
 
 
 def is_of_tool(name: str) -> bool:
@@ -198,6 +209,19 @@ def is_of_tool(name: str) -> bool:
 def is_tool_state(name: str) -> bool:
     """Whether a number is right wherever its tool is: `jaw_angle`, `magnet`, but not `jaw_x`."""
     return is_of_tool(name) and not re.search(_IN_SPACE, _words(name))
+
+
+def is_of_finger(name: str) -> bool:
+    """Whether a name is of a gripper's or a hand's own joints: `fr3_finger`, but no `arm_wsg50`."""
+    return re.search(r"\b(finger|gripper|thumb)s?\b", _words(name)) is not None
+
+
+def is_of_base(name: str) -> bool:
+    """Whether a name says where what carries the arm stands, which no joint tells."""
+    called = _words(name)
+    other = re.search(rf"{_SPEED}|{_ACCELERATION}|{_LOAD}|twist|joint", called)
+    is_where = other is None and _by_word(name) is not Kind.TOOL
+    return is_where and re.search(_OF_BASE, called) is not None
 
 
 def is_of_pose(name: str) -> bool:
@@ -213,15 +237,19 @@ def is_coordinate(name: str) -> bool:
 
 def says_no_position(name: str) -> bool:
     """Whether a name says that it is a rate, a torque, an increment or else, but no position."""
-    called = f"{name} {re.sub('(?<=[a-z])(?=[A-Z])', '_', name)}"
-    return _NO_POSITION.search(called) is not None or is_increment(name)
+    called = f"{_words(name)}; {_words(name.lower())}"
+    return bool(_NO_POSITION.search(called) or _DERIVED.search(name)) or is_increment(name)
 
 
 def zero_at_rest(names: Sequence[str], units: Sequence[str | None]) -> list[int]:
-    """Return the columns that are 0 at rest: increments, and speeds by their name or their unit."""
+    """Return the columns that are 0 at rest: increments, and speeds by their unit or their name.
+
+    What is in a unit of angle is no speed, whatever it is called.
+    """
     known = [unit or "1" for unit in units]
     summed, each = increments(names, known), enumerate(zip(known, kinds(names), strict=True))
-    return [i for i, (u, kind) in each if i in summed or kind in RATES or is_rate(u)]
+    named = [i for i, (u, kind) in each if kind in RATES and base_of(u)[0] not in TURN]
+    return [i for i, u in enumerate(known) if i in summed or i in named or is_rate(u)]
 
 
 def one_for_all(
@@ -244,8 +272,9 @@ def one_for_all(
 def _by_word(name: str) -> Kind:
     if is_increment(name) and is_coordinate(name):
         return Kind.LENGTH
-    table = _BY_WORD if is_tool_state(name) else (*_BY_NAME, *_BY_WORD)
     called = _words(name)
+    of_tool = re.search(_TOOL, called) and not re.search(_IN_SPACE, called)
+    table = _BY_WORD if of_tool else (*_BY_NAME, *_BY_WORD)
     return next((kind for pattern, kind in table if re.search(pattern, called)), Kind.UNKNOWN)
 
 

@@ -7,7 +7,6 @@ from prior_reinforce.arm.recordings import read_recordings
 from prior_reinforce.arm.recordings.beside import (
     arrays_beside,
     columns_beside,
-    is_of_base,
     moving_beside,
     twin_vectors,
 )
@@ -160,17 +159,3 @@ def test_a_base_of_many_numbers_hides_no_gripper():
     recording = Recording("a", T, Q, UR, beside=arrays_beside(Q, others, T))
     assert [*moving_beside([recording])][:2] == ["grip", "base_T[0]"]
     assert select([recording]).left_out.startswith("grip, 0 to 1; base_T[0], 1 to 2; base_T[1], 0")
-
-
-def test_a_name_says_where_a_base_stands_and_not_how_fast_or_of_what_tool():
-    where = ["base_pose", "/base_pose/pose/position/x", "odom", "base_heading"]
-    assert all(map(is_of_base, where))
-    other = [
-        "base_velocity",
-        "base_twist",
-        "base_force_x",
-        "base_joint",
-        "robotiq_base",
-        "baseline",
-    ]
-    assert not any(map(is_of_base, other))

@@ -159,3 +159,11 @@ def test_a_grippers_joints_are_none_of_the_arms():
         assert not is_joint(name, "joint4")
     assert is_joint("gripper_joint4", "gripper_joint4")
     assert matched("panda_joint1", "panda_finger_joint1", "panda_finger_joint2") == {0: 0}
+    assert matched("panda_joint1", "thumb_joint1") == {0: 0}
+
+
+@pytest.mark.parametrize(
+    "arm", ["ur5e_robotiq/", "panda_hand/", "left_hand/", "iiwa_wsg50/", "ur5_suction_", "swivel_"]
+)
+def test_an_arm_that_is_called_by_its_tool_keeps_its_joints(arm):
+    assert matched(*(f"{arm}joint{i}" for i in range(1, 8))) == {i: i for i in range(7)}

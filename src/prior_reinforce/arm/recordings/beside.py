@@ -17,7 +17,7 @@ from prior_reinforce.arm.recordings.naming import vectors
 from prior_reinforce.arm.recordings.recording import Beside, Positions, Recording
 from prior_reinforce.arm.recordings.time_finder import Times, is_clock, says_time, tells_time
 from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, Ambiguity, say_names, split_unit
-from prior_reinforce.plans.channels import RATES, Kind, kinds, measured_of, says_no_position
+from prior_reinforce.plans.channels import is_of_base, measured_of, says_no_position
 from prior_reinforce.plans.signals import held_channels
 from prior_reinforce.plans.whole_turns import TURN
 
@@ -34,9 +34,6 @@ _ELSE = re.compile(
 MASK = re.compile(
     r"((is|frame|attention|episode)_)?(pad|padded|padding|valid|masks?|(pad|padding|valid)_mask)"
 )
-_OF_BASE = re.compile(r"(^|[^a-z])(base|platform|odom(etry)?|rover|agv)([^a-z]|$)", re.IGNORECASE)
-_NOT_WHERE = re.compile("acc|twist|joint", re.IGNORECASE)
-"""What moves below the arm, by its name, and what but speeds and sensors is not where that is."""
 _SAME, _SHIFTS = 0.3, 21
 """Part of its spread by which a reading may differ from another, and delays that are tried, up to a
 fifth of the recording either way. Ours: a command differs by what a controller lags behind."""
@@ -154,12 +151,6 @@ def sides(name: str) -> set[str]:
     """Return which of several arms a name says that it is of: `left`, `r`, `robot1`."""
     spaced = re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower()
     return {match.group().replace("_", "") for match in _SIDE.finditer(spaced)}
-
-
-def is_of_base(name: str) -> bool:
-    """Whether a name says where what carries the arm stands, which no joint tells."""
-    is_where = not _NOT_WHERE.search(name) and kinds([name])[0] not in (*RATES, Kind.TOOL)
-    return is_where and _OF_BASE.search(name) is not None
 
 
 def may_move(name: str, width: int = 1) -> bool:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import columns_beside, is_of_base, may_move
+from prior_reinforce.arm.recordings.beside import columns_beside, may_move
 from prior_reinforce.arm.recordings.bounds import check_numbers
 from prior_reinforce.arm.recordings.messages import Message, read_messages
 from prior_reinforce.arm.recordings.options import ReadOptions
@@ -32,7 +32,7 @@ from prior_reinforce.arm.recordings.recording import (
 from prior_reinforce.arm.recordings.trajectories import read_trajectory
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import require_inside
-from prior_reinforce.plans.channels import says_no_position
+from prior_reinforce.plans.channels import is_of_base, says_no_position
 
 _SUFFIXES = (".bag", ".mcap", ".db3")
 _BAG = "a ROS bag, complete once its recorder ended (else: mcap recover, or ros2 bag reindex)"

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.errors import ConfigurationError, InvalidPlanError
-from prior_reinforce.plans.channels import is_of_tool, says_no_position
+from prior_reinforce.plans.channels import is_of_finger, says_no_position
 from prior_reinforce.plans.kinematics import Chain, JointPositions
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.whole_turns import attitudes, whole_circles
@@ -126,7 +126,7 @@ def is_joint(column: str, joint: str) -> bool:
     for name in (column, column.removesuffix(".pos")):
         before = name.removesuffix(joint)
         if before != name and (not before or before[-1] in "_/."):
-            return not (is_of_tool(before) or says_no_position(before))
+            return not (is_of_finger(before) or says_no_position(before))
     return False
 
 
