@@ -36,7 +36,7 @@ and the law of another task still unknown: so a first hit nearby does not make a
 Where offsets are not small the law is not known either: else a first miss that comes of changed
 hardware would be blamed on it. Ours: that all may be small, by P(hit) on the zoo's development
 tasks; the shares, by drawn laws and offsets (reproduction/benchmarks/drawn_laws.py)."""
-_IF_MIXED = ((1.0, 1.0, 1.0, 0.34), (1.0, 1.0, 4.0, 0.11), *_HOW_CLOSELY[1:])
+_IF_MIXED = ((1.0, 1.0, 1.0, 0.375), (1.0, 1.0, 4.0, 0.075), *_HOW_CLOSELY[1:])
 """The same where demonstrations are mixed: landing may be steep between them (ours, on the zoo's
 development tasks and V1 to V3; reproduction/docs/decisions-adapter.md). The first stays the most
 probable one: first throws aim by it."""
