@@ -8,6 +8,7 @@ import numpy as np
 
 from prior_reinforce.adapters.base import Adapter
 from prior_reinforce.formats import OutcomeFormat
+from prior_reinforce.generators.base import Generator
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.readings import Reading
@@ -27,14 +28,21 @@ def motion(conditions: np.ndarray, action_dim: int) -> np.ndarray:
     return size * np.sin(phase * (1 + joints / 5) + joints / 3) * np.cos(phase / 2)
 
 
-class Swing:
+class Swing(Generator):
     """A generator whose plans say their condition."""
+
+    name = "swing"
 
     def __init__(self, action_dim: int) -> None:
         self.action_dim = action_dim
 
     def generate(self, conditions: np.ndarray) -> np.ndarray:
         return motion(conditions, self.action_dim)
+
+    def _fit(self, demonstrations, seed, progress):
+        raise NotImplementedError
+
+    _generate = _fit
 
 
 class FullStep(Adapter):

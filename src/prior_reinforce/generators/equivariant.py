@@ -60,8 +60,9 @@ class Equivariant(Wrapper):
 
     def with_symmetry_used(self, demonstrations: Demonstrations) -> Demonstrations:
         """Return them with theirs, or that which was found; see `Generator.with_symmetry_used`."""
-        found = demonstrations.symmetry is None and self._anchors is not None
-        return demonstrations.with_symmetry(self._anchors.symmetry) if found else demonstrations
+        if self._anchors is None or demonstrations.symmetry is not None:
+            return demonstrations
+        return demonstrations.with_symmetry(self._anchors.symmetry)
 
     def check_demonstrations(self, demonstrations: Demonstrations) -> None:
         """Refuse too few to tell what a turn leaves; see `Generator.check_demonstrations`."""
