@@ -189,7 +189,7 @@ class VisionLanguageModel(Perception):
         calibration, (tall, wide) = self._in(picture), picture.shape[:2]
         found = [(reached.box, self.scene.reached.size), (goal.box, self.scene.goal.size)]
         (_, one), (_, other) = found
-        # Of another size its box would be another one, and of one size it lies beside.
+        # Objects of two sizes have two boxes, and two of one size cannot lie in one place.
         if np.allclose(reached.box, goal.box, rtol=0, atol=_DRAWN * _step(picture)):
             return "the model gives one box for both objects"
         read = [_misfit(box, calibration, size) for box, size in found]
