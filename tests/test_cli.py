@@ -5,9 +5,11 @@ import os
 import re
 import subprocess
 import sys
+from contextlib import suppress
 from importlib.metadata import version
 
 import pytest
+from tyro._docstrings import parse_docstring_from_object
 
 from prior_reinforce.adapters import ADAPTERS
 from prior_reinforce.cli import main
@@ -146,8 +148,17 @@ def test_every_help_has_an_example_and_says_no_none(capsys, name):
         assert "WORKSPACE" in shown.partition("\n\n")[0]
 
 
-def test_what_an_option_does_is_one_paragraph_however_its_source_is_wrapped(capsys, monkeypatch):
+@pytest.mark.parametrize(
+    "before", [("new", "--help"), ("new", "x", "--nope"), ("--tyro-print-completion", "bash")]
+)
+def test_what_an_option_does_is_one_paragraph_however_its_source_is_wrapped(
+    capsys, monkeypatch, before
+):
     monkeypatch.setenv("COLUMNS", "80")
+    parse_docstring_from_object.cache_clear()  # as in a new process
+    with suppress(SystemExit):
+        main(before)
+    capsys.readouterr()
     with pytest.raises(SystemExit):
         main(("new", "--help"))
     lines = [line.strip() for line in capsys.readouterr().out.splitlines()]

@@ -137,7 +137,8 @@ def _parse(args: list[str]) -> Command | None:
         import tyro
 
         kinds = {name: resolve_name(target) for name, target in COMMANDS.items()}
-        tyro.extras.subcommand_cli_from_dict(kinds, prog="prior-reinforce", args=args)
+        with _without_line_breaks():
+            tyro.extras.subcommand_cli_from_dict(kinds, prog="prior-reinforce", args=args)
     if name not in COMMANDS:
         kind = "option" if name.startswith("-") else "command"
         raise ConfigurationError(
@@ -162,7 +163,7 @@ def read(kind: type[AnyCommand], program: str, args: list[str]) -> AnyCommand:
 
     # Else the usage lacks the words that are there already.
     rest = ["--help"] if {"-h", "--help"} & {*args} else args
-    with _in_one_line(program), nullcontext() if rest is args else _without_line_breaks():
+    with _in_one_line(program), _without_line_breaks():
         command = tyro.cli(
             kind,
             prog=program,
@@ -240,7 +241,8 @@ def _in_one_line(program: str) -> Iterator[None]:
 def _without_line_breaks() -> Iterator[None]:
     """Let tyro see descriptions of options in one line each.
 
-    docstring_parser leaves later lines indented, and tyro then breaks lines there.
+    docstring_parser leaves later lines indented, and tyro then breaks lines there. At every call,
+    not for help alone: tyro keeps what it has read of a class, and errors read it too.
     """
     import docstring_parser
     from docstring_parser import Docstring, DocstringStyle
