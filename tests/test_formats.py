@@ -60,3 +60,20 @@ def test_what_an_adapter_expects_without_a_number_excuses_no_error():
     form = OutcomeFormat(("x", "y"), ("m", "m"), (0.015, 0.015))
     with pytest.raises(InvalidFeedbackError, match="looks like centimetres"):
         as_bare_error([20.0, 15.0], np.array([0.9, 0.1]), form, expected=[np.nan, np.nan])
+
+
+def test_a_computed_error_may_be_as_large_as_the_goal_is_far():
+    form = OutcomeFormat(("x", "y", "turn"), ("m", "m", "rad"), (0.05, 0.05, 0.05))
+    goal = np.array([0.2, -2.4, 0.5])
+    computed = [-1.0427512, 3.0870445, 0.1]
+    np.testing.assert_array_equal(as_bare_error(computed, goal, form), computed)
+    for typed, why in (
+        ([-1.043, 3.087, 0.1], "x of -1.043 m looks like centimetres"),
+        ([-4.9427512, 3.0870445, 0.1], "x of -4.94275 m looks like centimetres"),
+        ([0.1, -30.4412345, 0.1], "y of -30.4412 m looks like centimetres"),
+    ):
+        with pytest.raises(InvalidFeedbackError, match=why):
+            as_bare_error(typed, goal, form)
+    outcome = goal + np.array([0.0123456, -0.0345678, 0.01])
+    with pytest.raises(InvalidFeedbackError, match="looks like where the object ended"):
+        as_bare_error(outcome, goal, form)

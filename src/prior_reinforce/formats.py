@@ -25,6 +25,9 @@ gives numbers for words means to; with twice as much, P(hit) is said too low and
 _FAR = 10.0
 """Tolerances from which an error is looked at twice (ours): 15 cm, where 1.5 cm are allowed. It is
 taken for an outcome, or an outcome for an error, where that would be four times nearer."""
+_TYPED = 3
+"""Digits behind the point that people type at most (ours). Longer numbers were computed, in the
+unit that is asked for: they may be twice as large as the goal's."""
 
 
 @dataclass(frozen=True)
@@ -186,6 +189,9 @@ def as_bare_error(
             f"{said} looks like {mistaken}; give {asked}, or the unit if it is that "
             "(in Python a pr.Reading, as pr.Reading.measured)"
         )
+    if not np.array_equal(array, array.round(_TYPED)):
+        of_unit = np.equal.outer(form.units, form.units)
+        doubted &= ~(np.abs(error) <= 2.0 * np.max(of_unit * np.abs(goal), axis=1))
     if slip := form.slip(np.where(doubted, error, 0.0), error=True):
         what = "where it ended" if landed else "outcome minus goal"
         raise InvalidFeedbackError(f"an error in {slip} ({what}), or words with their unit")
