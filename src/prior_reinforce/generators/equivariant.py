@@ -196,12 +196,14 @@ class Equivariant(Wrapper):
 
 
 def _say_found(symmetry: Symmetry, names: Sequence[str]) -> str:
-    """Say which joint demonstrations show to be turned by the bearing, and how to leave it so."""
+    """Say what demonstrations show to be turned by the bearing, and how to leave it so."""
     turn = symmetry.moves[1]
-    assert isinstance(turn, TurnJoint)
+    what, axis = "dx and dy turn", "origin"
+    if isinstance(turn, TurnJoint):
+        what, axis = f"{names[turn.joint]} turns", "base"
     return (
-        f"symmetry: {names[turn.joint]} turns with the outcome's bearing, so a turn about the base "
-        "is taken out, and the rest learned (not so: generator auto,symmetry=none)"
+        f"symmetry: {what} with the outcome's bearing, so a turn about the {axis} is taken out, "
+        "and the rest learned (not so: generator auto,symmetry=none)"
     )
 
 

@@ -41,6 +41,54 @@ def test_a_first_joint_that_follows_the_bearing_is_a_turn_about_the_base(way, n)
     np.testing.assert_allclose(moved - plan, [[way * 0.3, 0, 0]] * len(plan), atol=1e-12)
 
 
+def test_a_turn_is_found_where_all_begin_at_one_pose():
+    shown = throws()
+    plans = shown.plans.copy()
+    plans[:, :, 0] *= np.minimum(np.linspace(0.0, 1.4, 50), 1.0)
+    assert np.ptp(plans[:, 0, 0]) == 0
+    found = find_turn(Demonstrations(plans, shown.outcomes_seen, FORM))
+    assert found is not None
+    assert found.moves[1] == TurnJoint(0, 1.0)
+
+
+def pushes(*, slope=1.0, names=("dx", "dy", "dyaw"), units=("m", "m", "rad"), ahead=0.0):
+    """Straight pushes with increments that head where the object is to go."""
+    rng = np.random.default_rng(0)
+    bearing, distance = ahead + rng.uniform(-0.5, 0.5, 6), rng.uniform(0.8, 1.2, 6)
+    place = distance[:, None] * np.column_stack([np.cos(bearing), np.sin(bearing)])
+    speed = np.sin(np.linspace(0, np.pi, 50)) * distance[:, None] * 0.01
+    heading = slope * bearing[:, None]
+    steps = np.stack([speed * np.cos(heading), speed * np.sin(heading), 0 * speed], axis=2)
+    return Demonstrations(steps, place, PlanFormat(names, units, 0.02))
+
+
+@pytest.mark.parametrize("ahead", [0.0, np.pi])
+def test_increments_that_head_where_the_object_goes_are_a_turn_about_the_origin(ahead):
+    shown = pushes(ahead=ahead)
+    found = find_turn(shown)
+    assert found is not None
+    made = pr.make_generator("auto").fit(shown, seed=0)
+    assert "dx and dy turn with the outcome's bearing" in made.remarks[0]
+    for off in (-0.45, 0.02, 0.4):
+        bearing = ahead + off
+        (plan,) = made.generate([[np.cos(bearing), np.sin(bearing)]])
+        dx, dy = plan[:, :2].sum(axis=0)
+        assert np.cos(np.arctan2(dy, dx) - bearing) == pytest.approx(1.0, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    "shown",
+    [
+        pushes(slope=0.4),
+        pushes(names=("dx", "dz", "dyaw")),
+        pushes(names=("dx", "dy", "drx")),  # which a turn would leave behind
+    ],
+    ids=["slope", "height", "attitude"],
+)
+def test_other_increments_show_none(shown):
+    assert find_turn(shown) is None
+
+
 @pytest.mark.parametrize("ahead", [0.0, 2.75, np.pi, -np.pi / 2])
 def test_throws_may_go_anywhere_about_the_base(ahead):
     made = pr.make_generator("auto").fit(throws(ahead=ahead), seed=0)
