@@ -9,7 +9,9 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
+from itertools import takewhile
 from typing import NoReturn
 
 from prior_reinforce.arm.robots.urdf_file import Joint
@@ -43,35 +45,6 @@ def joints_to(link: str, moving: Mapping[str, Joint], base: str | None = None) -
     return found[::-1]
 
 
-def fixed_behind(
-    link: str, links: Sequence[str], moving: Mapping[str, Joint], hold: Collection[str]
-) -> list[str]:
-    """Return the links that stand still against a link, and these, from it outwards."""
-    rigid = {link: None}
-    for other in links:
-        if other in moving and _still(moving[other], hold) and moving[other].parent in rigid:
-            rigid[other] = None
-    return [*rigid][1:]
-
-
-def moved_behind(
-    link: str, links: Sequence[str], moving: Mapping[str, Joint], hold: Collection[str]
-) -> list[str]:
-    """Return the names of the joints behind a link that move by themselves."""
-    inside, found = {link}, list[str]()
-    for other in links:
-        if other in moving and moving[other].parent in inside:
-            inside.add(other)
-            if not _still(moving[other], hold) and moving[other].mimics is None:
-                found.append(moving[other].name)
-    return found
-
-
-def is_conventional(link: str) -> bool:
-    """Whether a link is the flange by its name."""
-    return _rank(link) < len(_TIPS)
-
-
 def arms_own(names: Sequence[str]) -> int:
     """Return how many joints of a chain are the arm's by their names, from its base on.
 
@@ -94,40 +67,54 @@ def arms_own(names: Sequence[str]) -> int:
     return len(names) - 1
 
 
-def find_flange(
-    links: Sequence[str],
-    moving: Mapping[str, Joint],
-    base: str,
-    hold: Collection[str],
-    meshes: Mapping[str, str],
-) -> str:
-    """Return the link that is the flange of the one arm behind the base.
+@dataclass(frozen=True)
+class _Arm:
+    """One way from the base outwards, and how far it is an arm's without doubt."""
 
-    Args:
-        links: From the root outwards.
-        moving: The joint that moves each link.
-        base: Where the arm begins.
-        hold: Joints that stand still.
-        meshes: File names of each link's meshes: of a CAD program's export often all that tells.
+    way: Sequence[str]
+    """The bodies from the base, without it."""
+    own: int
+    """How many of them are the arm's without doubt."""
+    doubtful: Joint | None
+    """The joint behind these that may be the arm's as well, or a tool's."""
 
-    Raises:
-        UnclearFlangeError: There are several arms, or a joint may be the arm's or a tool's.
-    """
-    return _Tree(links, moving, base, hold, meshes).flange()
+    @property
+    def end(self) -> str:
+        return self.way[self.own - 1]
+
+    def has_rival(self, other: _Arm, named: bool) -> bool:
+        """Whether another is an arm as well, of similar size; fewer are where this one is named."""
+        shared = len({*self.way[: self.own]} & {*other.way[: other.own]})
+        rest, own = self.own - shared, other.own - shared
+        if not rest or 2 * own <= rest or own > MOST_JOINTS:
+            return False
+        return own >= _SHORTEST_ARM or (own >= rest and not named)
 
 
-class _Tree:
-    """What the arm's joints move, from the base outwards."""
+class Tree:
+    """What a description's joints move behind a base: the one arm there, and what it carries."""
 
     def __init__(
         self,
         links: Sequence[str],
         moving: Mapping[str, Joint],
         base: str,
-        hold: Collection[str],
+        still: Collection[str],
         meshes: Mapping[str, str],
     ) -> None:
-        self.links, self.moving, self.hold = links, moving, hold
+        """Sort the links by the joints that carry them.
+
+        Args:
+            links: From the root outwards.
+            moving: The joint that moves each link.
+            base: Where the arm begins.
+            still: Joints that stand still.
+            meshes: File names of each link's meshes: of a CAD program's export often all that
+                tells.
+        """
+        self.moving = moving
+        self.rigid = {base: base}
+        """By link, the innermost one against which it stands still."""
         self.body = {base: base}
         """By link, the one that the turning joint before it moves; without a gripper's."""
         self.depth = {base: 0}
@@ -136,15 +123,21 @@ class _Tree:
         """What slides or follows, by the body that carries it."""
         self.gripper = defaultdict[str, list[Joint]](list)
         """Joints that are a gripper's by name, likewise."""
+        self.followers = defaultdict[str, list[Joint]](list)
+        """What follows a joint, by its name."""
         carrying = {joint.parent for joint in moving.values()}
         for link in links:
             joint = moving.get(link)
-            if link == base or joint is None or joint.parent not in self.body:
+            if link == base or joint is None or joint.parent not in self.rigid:
                 continue
-            before = self.body[joint.parent]
+            stands = joint.type == "fixed" or joint.name in still
+            self.rigid[link] = self.rigid[joint.parent] if stands else link
+            before = self.body.get(joint.parent)
             # A hand is called by its fingers, too: a mesh tells of what carries nothing else.
             mesh = "" if link in carrying else meshes.get(link, "")
-            if _still(joint, hold):
+            if before is None:
+                continue  # behind a gripper's joint
+            if stands:
                 self.body[link] = before
             elif _of_a_gripper(joint, mesh):
                 self.gripper[before].append(joint)
@@ -158,35 +151,47 @@ class _Tree:
         for link, body in self.body.items():
             if self.depth[body] and _rank(link) < _rank(self.tips.get(body, "")):
                 self.tips[body] = link
-        self.followers = defaultdict[str, list[Joint]](list)
-        """What follows a joint."""
         for joint in moving.values():
             self.followers[joint.mimics or ""].append(joint)
 
     def flange(self) -> str:
-        """The one rule, see the module."""
+        """Return the link that is the flange of the one arm: the rule of this module.
+
+        Raises:
+            UnclearFlangeError: There are several arms, or a joint may be the arm's or a tool's.
+        """
         ends = self._ends()
         named = [body for body in ends if body in self.tips]
         if len(named) > 1 or not ends:
             self._several([self.tips[body] for body in named])
-        doubts = dict[str, tuple[list[str], int, Joint]]()
-        arms = dict[str, list[str]]()
-        """Bodies from the base to where each arm ends."""
+        arms = dict[str, _Arm]()
         for end in ends:
             way = self._way(end)
-            doubt = None if end in named else self._doubt(way)
-            if doubt is not None:
-                end = way[doubt[0] - 1]
-                doubts.setdefault(end, (way, *doubt))
-                way = way[: doubt[0]]
-            arms[end] = way
-        end = named[0] if named else max(arms, key=self.depth.__getitem__)
-        rivals = [other for other in arms if self._rivals(arms[end], arms[other], bool(named))]
+            found = _Arm(way, len(way), None) if end in named else self._arm(way)
+            arms.setdefault(found.end, found)
+        arm = arms[named[0]] if named else max(arms.values(), key=lambda each: each.own)
+        rivals = [other for other in arms.values() if arm.has_rival(other, bool(named))]
         if rivals:
-            self._several([self._said(body, doubts) for body in (end, *rivals)])
-        if end in doubts:
-            self._ask(*doubts[end])
-        return self.tips.get(end, end)
+            self._several([self._said(each) for each in (arm, *rivals)])
+        if arm.doubtful is not None:
+            self._ask(arm, arm.doubtful)
+        return self.tips.get(arm.end, arm.end)
+
+    def said_behind(self, body: str) -> str:
+        """Say what is fixed to the arm's last moving link, if no convention's, and moves behind."""
+        fixed = [] if body in self.tips else self._fixed_to(body)
+        inside, moved = {body}, list[str]()
+        for link, rigid in self.rigid.items():
+            if link in self.moving and self.moving[link].parent in inside:
+                inside.add(link)
+                if rigid == link and self.moving[link].mimics is None:
+                    moved.append(self.moving[link].name)
+        said = f"; fixed behind it: {listed(fixed)} (--tip NAME takes one)" * bool(fixed)
+        return said + f"; moved behind it: {listed(moved, most=3)}" * bool(moved)
+
+    def _fixed_to(self, body: str) -> list[str]:
+        """Links that stand still against the one that a joint moves, from it outwards."""
+        return [link for link, rigid in self.rigid.items() if rigid == body != link]
 
     def _ends(self) -> list[str]:
         """Bodies in which arms may end: none turns behind them, or what does is a tool."""
@@ -211,56 +216,46 @@ class _Tree:
             body = self._before(body)
         return found[::-1]
 
-    def _rivals(self, arm: Sequence[str], other: Sequence[str], named: bool) -> bool:
-        """Whether another end is an arm's as well, of similar size."""
-        shared = _shared(arm, other)
-        rest, own = len(arm) - shared, len(other) - shared
-        if not rest or 2 * own <= rest or own > MOST_JOINTS:
-            return False
-        return own >= _SHORTEST_ARM or (own >= rest and not named)
-
     def _several(self, ends: Sequence[str]) -> NoReturn:
         raise UnclearFlangeError(
             f"it ends in {listed(ends, most=_MOST_NAMED) or 'no turning joint'}; say which link is "
             "the flange with --tip"
         )
 
-    def _said(self, body: str, doubts: Mapping[str, tuple[list[str], int, Joint]]) -> str:
+    def _said(self, arm: _Arm) -> str:
         """An arm's end, and the other where there is a doubt."""
-        tip = self.tips.get(body, body)
-        way, _, joint = doubts.get(body, ([], 0, None))
-        if joint is None or joint in self.gripper[body]:
+        tip, joint = self.tips.get(arm.end, arm.end), arm.doubtful
+        if joint is None or joint in self.gripper[arm.end]:
             return tip
-        return f"{tip} (or {self._else(way, joint)})"
+        return f"{tip} (or {self._else(arm.way, joint)})"
 
-    def _doubt(self, way: Sequence[str]) -> tuple[int, Joint] | None:
-        """How many joints on a way are the arm's without doubt, and the first that may be."""
-        own, n = [self.moving[body] for body in way], len(way)
+    def _arm(self, way: Sequence[str]) -> _Arm:
+        """Which of the joints on a way are the arm's without doubt."""
+        own, n, last = [self.moving[body] for body in way], len(way), way[-1]
         names = [joint.name for joint in own]
         branch = self._branch(way)
         if branch < n:  # fingers share most of their joints, arms few
             n = arms_own(names[:branch])
-            return n, own[n]
-        for joint in self.gripper[way[-1]]:
+            return _Arm(way, n, own[n])
+        for joint in self.gripper[last]:
             if joint.free:
-                return n, joint
+                return _Arm(way, n, joint)
         for i, body in enumerate(way[:-1], 1):
             if body in self.tips:
-                return i, own[i]
+                return _Arm(way, i, own[i])
         if (sure := arms_own(names)) < n:
-            return sure, own[sure]
+            return _Arm(way, sure, own[sure])
         for follower in self.followers[names[-1]]:  # two fingers, beside each other
             if n > 1 and self.body.get(follower.parent) == way[-2]:
-                return n - 1, own[-1]
-        others = self.others[way[-1]]
-        slides = [self._carrier(joint) for joint in others if joint.type == "prismatic"]
-        for joint in others:
+                return _Arm(way, n - 1, own[-1])
+        slides = [self.rigid[j.parent] for j in self.others[last] if j.type == "prismatic"]
+        for joint in self.others[last]:
             # What follows a tool's joint is the tool's, and two that slide side by side grip.
             tools = joint.mimics is not None and joint.mimics not in names
-            grips = joint.type == "prismatic" and slides.count(self._carrier(joint)) > 1
+            grips = joint.type == "prismatic" and slides.count(self.rigid[joint.parent]) > 1
             if not (tools or grips):
-                return n, joint
-        return None
+                return _Arm(way, n, joint)
+        return _Arm(way, n, None)
 
     def _branch(self, way: Sequence[str]) -> int:
         """How many joints are before a hand's fingers; all where there is none."""
@@ -280,28 +275,19 @@ class _Tree:
             before[:] = sorted([*before, (size, body)])[-2:]
         return found
 
-    def _carrier(self, joint: Joint) -> str:
-        """The outermost moved link to which a joint's parent is fixed."""
-        link = joint.parent
-        while link in self.moving and _still(self.moving[link], self.hold):
-            link = self.moving[link].parent
-        return link
-
-    def _ask(self, way: Sequence[str], n: int, joint: Joint) -> NoReturn:
-        """Ask whether the arm ends behind its n-th joint, before the one in doubt."""
-        proposed, last = way[n - 1], self.moving[way[n - 1]].name
-        fixed = fixed_behind(proposed, self.links, self.moving, self.hold)
-        proposed = self.tips.get(proposed, proposed)
-        fixed = [link for link in fixed if link != proposed]
+    def _ask(self, arm: _Arm, joint: Joint) -> NoReturn:
+        """Ask whether the arm ends before the joint in doubt."""
+        last, proposed = self.moving[arm.end].name, self.tips.get(arm.end, arm.end)
+        fixed = [link for link in self._fixed_to(arm.end) if link != proposed]
         also = f", or one that is fixed to it: {listed(fixed, most=_MOST_NAMED)}" * bool(fixed)
         doubt = "may be a tool's"
-        if joint in self.gripper[way[-1]]:
+        if joint in self.gripper[arm.way[-1]]:
             doubt = "looks like a gripper's"
         elif joint.mimics is not None:
             doubt = f"follows {joint.mimics}, and {doubt}"
         raise UnclearFlangeError(
             f"joint {joint.name} {doubt}; say which link is the flange with --tip: {proposed}, "
-            f"which the arm's last joint {last} moves{also}; or {self._else(way, joint)}",
+            f"which the arm's last joint {last} moves{also}; or {self._else(arm.way, joint)}",
             proposed,
         )
 
@@ -316,20 +302,10 @@ class _Tree:
         return f"--tip {joint.child} {at}, if it is the arm's and stands still; or {none}"
 
 
-def _shared(one: Sequence[str], other: Sequence[str]) -> int:
-    """How many of their first items agree."""
-    pairs = enumerate(zip(one, other, strict=False))
-    return next((i for i, (a, b) in pairs if a != b), min(len(one), len(other)))
-
-
 def _rank(link: str) -> int:
     """Which of the conventions a link follows; their number where it follows none."""
     found = _TIP.search(link)
     return len(_TIPS) if found is None else _TIPS.index(found[1])
-
-
-def _still(joint: Joint, hold: Collection[str]) -> bool:
-    return joint.type == "fixed" or joint.name in hold
 
 
 def _of_a_gripper(joint: Joint, mesh: str) -> bool:
@@ -342,7 +318,8 @@ def _of_a_gripper(joint: Joint, mesh: str) -> bool:
 def _alike(name: str, other: str) -> bool:
     """Whether two names are the same up to a number, or a letter alone: joint_5 and joint_6_t."""
     name, other = name.casefold(), other.casefold()
-    same = name[: _shared(name, other)].rstrip("0123456789")
+    pairs = takewhile(lambda pair: pair[0] == pair[1], zip(name, other, strict=False))
+    same = "".join(letter for letter, _ in pairs).rstrip("0123456789")
     ends = name[len(same) :], other[len(same) :]
     if same[-1:].isalpha():
         return all(end[:1].isdigit() for end in ends)

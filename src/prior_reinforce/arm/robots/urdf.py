@@ -10,12 +10,9 @@ import numpy as np
 
 from prior_reinforce.arm.robots.flange import (
     MOST_JOINTS,
+    Tree,
     arms_own,
-    find_flange,
-    fixed_behind,
-    is_conventional,
     joints_to,
-    moved_behind,
 )
 from prior_reinforce.arm.robots.limits import ENDLESS, PerJoint, RobotLimits
 from prior_reinforce.arm.robots.urdf_file import BESIDE, LARGEST, TURNING, TYPES, Joint, read_joints
@@ -63,15 +60,16 @@ def read_urdf(
         UnclearFlangeError: A joint may be the arm's or a tool's, or there are several arms.
     """
     name, joints, links, meshes = read_joints(path)
-    moving, said, unsaid = {joint.child: joint for joint in joints}, dict(hold or {}), tip is None
+    moving, said = {joint.child: joint for joint in joints}, dict(hold or {})
     named = {joint.name: joint for joint in joints}
     try:
         still = _still(named, said)
         for link in {tip, base} - {None, *links}:
             few = ", ".join(links[:_MOST_NAMED])
             raise ConfigurationError(f"it has no link {link!r}; it has {few}")
-        if tip is None:
-            tip = find_flange(links, moving, links[0] if base is None else base, still, meshes)
+        tree = Tree(links, moving, base or links[0], still, meshes) if tip is None else None
+        if tree is not None:
+            tip = tree.flange()
         chain, way = joints_to(tip, moving, base), joints_to(tip, moving)
         if base is not None and (not chain or chain[0].parent != base):
             raise ConfigurationError(f"link {base} is not on the way to {tip}; say another --base")
@@ -91,11 +89,8 @@ def read_urdf(
     source = f"{path.name}, from {chain[0].parent}{f' (z as in {links[0]})' * tilted} to {tip}"
     source += "".join(f", {name} held at {position:g}" for name, position in said.items())
     source += ", soft limits too" * any("safety_controller" in joint.parts for joint in turning)
-    # A convention's link is the flange, and what is fixed behind it a tool.
-    behind = fixed_behind(tip, links, moving, still) if unsaid and not is_conventional(tip) else []
-    source += f"; fixed behind it: {listed(behind)} (--tip NAME takes one)" * bool(behind)
-    tools = moved_behind(turning[-1].child, links, moving, still) if unsaid else []
-    source += f"; moved behind it: {listed(tools, most=3)}" * bool(tools)
+    if tree is not None:
+        source += tree.said_behind(turning[-1].child)
     capped = [j for j in turning if j.type == "continuous" and 0 < np.ptp(j.ends()) < 2 * ENDLESS]
     over = [f"lower and upper of joint {joint.name}, which is continuous" for joint in capped]
     over += [f"{what} of joint {joint.name}" for joint in joints for what in joint.unknown]
