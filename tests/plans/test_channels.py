@@ -30,6 +30,7 @@ from prior_reinforce.plans.channels import (
         (Kind.TOOL, "gripper finger_joint1 robotiq_pos pressure 夹爪 linear_gripper Greiferweite"),
         (Kind.SLIDE, "E1 d3 scara_d3 axis_E1 rail ext_axis_1 linearAxis slider prismatic_joint"),
         (Kind.UNKNOWN, "foo crank spring x z level travel tau_d_1 velvet novelty_score marvel_x"),
+        (Kind.UNKNOWN, "waterlevel movel_1 nivel gravel_2 velcro_1 laser_dot_x pivot robot"),
         (Kind.UNKNOWN, "ddq_d_0 swivel bevel_1 thumb_1 pumpkin tongue left_knuckle"),
         (Kind.ANGLE, "swivel_joint shovel_joint wrist_twist omega7_joint1 thumb_joint_0"),
         (Kind.ANGLE, "joint_d_1 theta_d_0 joint_e_1 arm_d_1 head_d_2 tau_J_d_0 wrist_d_1"),
@@ -49,12 +50,13 @@ from prior_reinforce.plans.channels import (
         (
             Kind.VELOCITY,
             "velocity_x vel_y linear_velocity_z gripper_vx TCPSpeed cmd_vel/linear/x twist.linear.x"
-            " velocity_linear_0 lin_vel_0 linvel_1 velx",
+            " velocity_linear_0 lin_vel_0 linvel_1 velx x_dot ydot tcp_z_dot",
         ),
         (
             Kind.TURN_RATE,
             "twist.angular.z cmd_vel/angular/z anglevel_1 angvel_z rotvel_x elbowvel qvel_0"
-            " VelJ1 thumb_vel omega_1 vel_joint4 vitesse_joint4"
+            " cmdvel_1 desvel1 actvel_0 slewvel swivelvel jointsvel_2 velj1 velact_0 theta_dot"
+            " thetadot1 joint1_dot phiDot VelJ1 thumb_vel omega_1 vel_joint4 vitesse_joint4"
             " Gelenkgeschwindigkeit_1 速度_joint4 dq dQ",
         ),
         (
@@ -67,6 +69,8 @@ from prior_reinforce.plans.channels import (
         (Kind.QUATERNION, "robot0_eef_quat_0 quat_3"),
         (Kind.ROTATION, "robot0_eef_rot_axis_angle_0"),
         (Kind.MATRIX, "rot6d_0 rot6d_1"),
+        (Kind.MATRIX, "rot6d0 rot6d1"),
+        (Kind.TOOL, "O_F_ext_hat_K_0 K_F_ext_hat_K_5 tau_ext_hat_filtered_0"),
         (Kind.MATRIX, "R11 R12 R13 R21 R22 R23 R31 R32 R33"),
     ],
 )
@@ -99,8 +103,10 @@ def test_a_name_says_what_a_channel_is(kind, names):
         (
             says_no_position,
             "dyaw drx dx gripper_dyaw world_vector_0 joint4.torque ddq_1 tcp_pose left/d_joint1 dQ"
-            " linacc_1 twist.linear.x",
-            "joint4 q_1 level_joint4 travelled dynamixel_1 gripper swivel_joint wrist_twist",
+            " linacc_1 twist.linear.x cmdvel_1 O_F_ext_hat_K_0 qddot_1 theta_ddot xdot joint1.d dd3"
+            " scara/d v1",
+            "joint4 q_1 level_joint4 travelled dynamixel_1 gripper swivel_joint wrist_twist d3 D_1"
+            " scara/d3 d[3] q_d",
         ),
         (
             is_of_finger,

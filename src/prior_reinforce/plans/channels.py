@@ -53,7 +53,8 @@ _INCREMENT = re.compile(
 )
 """What an increment is called, in `_words`; `world_vector` is that of RT-1 (Open X-Embodiment), and
 `delta_1` a joint of a delta robot."""
-_LOAD = "force|torque|wrench|effort"
+_LOAD = r"force|torque|wrench|effort|\b(f|tau) ext\b"
+"""What a load is called; `O_F_ext_hat_K` and `tau_ext` are libfranka's."""
 _TOOL = (
     r"grip|jaw|finger|width|claw|opening|suction|robotiq|wsg|greifer|pince|夹爪|夹具|vacuum|valve"
     r"|magnet|trigger|\b(pump|pinch|tong)s?\b|drive joint|tool d[io]\b"
@@ -85,12 +86,13 @@ _ALONG = rf"{_STRAIGHT}|{_RAIL}|belt|conveyor|(tcp|eef?)(?!.* [3-5]$)"
 """What goes at m/s; of six numbered speeds of a tool, `actual_TCP_speed_0` (UR), the last turn."""
 _OMEGA = r"omega(?! \d+ joint)"
 _SPEED = (
-    rf"(\b([a-z]|d*q|\w*({_WITHIN}|{_RAIL})|ang(ular)?|lin|trans|tip|tcp|eef?|wheel|motor)?"
-    rf"vel(s|o|cmd|ang|{_STRAIGHT})?\b|veloc|speed|geschwind|vitesse|速|{_OMEGA}"
+    rf"((?<!(?<!ang)le|\b(?:be|mo|ni|no))(?<!tra|gra|mar|swi|sho)vel(s|o|cmd|ang|{_STRAIGHT})?\b"
+    rf"|\bvel(?!vet|cro)|veloc|speed|geschwind|vitesse|速|{_OMEGA}|(?<!d)dot(?=( \d+)?$)"
     rf"|\btwist(?= (ang(ular)?|{_STRAIGHT})\b))"
 )
-"""What a speed is called; `swivel`, `shovel`, `wrist_twist` and `omega7_joint1` are joints."""
-_ACCELERATION = r"accel|\b(ang|lin)?acc\b|jerk|beschleun"
+"""What a speed is called, `cmdvel` and `xdot` too; `swivel`, `level`, UR's `movel`,
+`wrist_twist` and `omega7_joint1` are none."""
+_ACCELERATION = r"accel|\b(ang|lin)?acc\b|ddot\b|jerk|beschleun"
 _NO_POSITION = re.compile(
     rf"{_SPEED}|{_LOAD}|{_ACCELERATION}|tau|current|temperature|cartesian|tcp|pose"
     r"|delta|increment|relative|residual|derivative|moment|couple|力矩|扭矩|トルク|增量|増分"
@@ -99,18 +101,18 @@ _NO_POSITION = re.compile(
 )
 """Words of rates, torques, increments and whatever else is no joint position, in `_words`. Ours,
 and broad on purpose: a column that is not taken for a joint's is named, and can be renamed."""
-_DERIVED = re.compile(r"(^|[/.:])(d+|v|dv|dt)($|[^a-z])", re.IGNORECASE)
-"""What a derivative is called before a joint: `d_joint1`; `q_d` is desired."""
+_DERIVED = re.compile(r"(^|[/.:])(d(?!\W?_?\d)|dd+|v|dv|dt)($|[^a-z])", re.IGNORECASE)
+"""What a derivative is called before a joint: `d_joint1`; `q_d` is desired, `d3` slides."""
 _BY_NAME = (
     (r"\bd ?[xyz]$|torso ?lift", Kind.LENGTH),
     (rf"\bw[xyz]$|{_OMEGA}|\b(dq|qd|d q|q ?dot)\b|\b({_ANGLES}|turn) rate\b", Kind.TURN_RATE),
-    (rf"\b(ang|rot)(.*{_SPEED}|\w*vels?\b)|{_SPEED}.*\bang", Kind.TURN_RATE),
-    (rf"\bv[xyz]$|\b({_ALONG})( ?{_SPEED}|vels?\b)", Kind.VELOCITY),
-    (rf"{_SPEED}\w* ({_STRAIGHT})\b|\bvel({_STRAIGHT})\b", Kind.VELOCITY),
+    (rf"\b(ang|rot).*{_SPEED}|{_SPEED}.*\bang", Kind.TURN_RATE),
+    (rf"\bv[xyz]$|\b({_ALONG}) ?{_SPEED}", Kind.VELOCITY),
+    (rf"{_SPEED}\w* ({_STRAIGHT})\b|vel({_STRAIGHT})\b", Kind.VELOCITY),
     (_SPEED, Kind.TURN_RATE),
     (r"quat(ernion)? \d$", Kind.QUATERNION),
     (r"(rot ?vec|axis ?angle) \d$", Kind.ROTATION),
-    (r"rot(ation)? ?6 ?d\b", Kind.MATRIX),
+    (r"rot(ation)? ?6 ?d\d*\b", Kind.MATRIX),
 )
 """Kinds by what the name says in `_words`, unless it is of a tool; the first counts."""
 _BY_WORD = (
