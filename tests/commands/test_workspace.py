@@ -331,6 +331,21 @@ def test_what_is_no_length_needs_a_tolerance_of_its_own(run, tmp_path):
     assert run(*new, "--tolerance", "5")[0] == 0
 
 
+@pytest.mark.parametrize(
+    ("names", "units"),
+    [
+        ("x y z qw qx qy qz", ("m",) * 3 + ("1",) * 4),
+        ("joint1 joint2 gripper", ("rad",) * 3),
+        ("joint1 torso_lift joint1_vel", ("rad", "m", "rad/s")),
+    ],
+)
+def test_columns_without_units_have_those_of_what_they_are_called(run, tmp_path, names, units):
+    folder = tmp_path / "w"
+    assert run("new", folder, "--robot", "none", "--action-names", *names.split())[0] == 0
+    with Workspace(folder) as workspace:
+        assert workspace.manifest.format.units == units
+
+
 @pytest.mark.parametrize("where", ["0.7 0", "carried", "anywhere"])
 def test_motions_are_moved_in_metres_and_outcomes_in_another_unit_refused(run, tmp_path, where):
     columns = ["--robot", "none", "--action-names", "x", "y", "--action-units", "m"]

@@ -17,7 +17,7 @@ from prior_reinforce.arm.robots.urdf import read_urdf
 from prior_reinforce.arm.workspace.declared import read_object
 from prior_reinforce.arm.workspace.manifest import LIMIT_LISTS, UNKNOWN
 from prior_reinforce.errors import ConfigurationError, FileFormatError
-from prior_reinforce.plans.channels import RATES, kinds
+from prior_reinforce.plans.channels import kinds
 from prior_reinforce.registry import parse_choice
 from prior_reinforce.settings import tomllib
 from prior_reinforce.units import factor
@@ -48,7 +48,7 @@ class NewWorkspace:
     the first import has."""
     action_units: tuple[str, ...] = ()
     """Unit of each action dimension; a single one holds for all; rad if not given, and of what is
-    called a speed rad/s or m/s."""
+    called a speed rad/s or m/s, a place m."""
     gripper: str | None = None
     """Unit of a gripper's opening, one more dimension: percent, m, steps, ..., or none; an SO-101
     has one in percent if not given."""
@@ -100,8 +100,11 @@ class NewWorkspace:
                 "--gripper adds a column to an arm's joints, and --robot is none; name all columns "
                 "with --action-names, or drop it: the first import then takes what was recorded"
             )
-        usual = [kind.usual_unit(0.0) if kind in RATES else "rad" for kind in kinds(names)]
-        units = _spread(self.action_units, len(names)) if self.action_units else usual
+        units: Sequence[str] = ("rad",) * len(names)
+        if self.action_units:
+            units = _spread(self.action_units, len(names))
+        elif self.action_names is not None:
+            units = [kind.usual_unit(math.inf) for kind in kinds(names)]
         if unit != "none":
             names, units = (*names, own), (*units, unit)
         given = None
