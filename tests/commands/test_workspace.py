@@ -182,13 +182,14 @@ def test_where_no_flange_is_proposed_one_has_to_be_said(run, tmp_path, monkeypat
     left, right = ([J(f"{s}_a", f"{s}1", **of), J(f"{s}_b", f"{s}2")] for s in ("l", "r"))
     (tmp_path / "arm.urdf").write_text(Urdf("two", [*left, *right]).text())
     monkeypatch.setattr("sys.stdin.isatty", lambda: True)
-    answers = iter(["", " ", "r2", "none"])
+    answers = iter(["", " ", "2r", "r2", "none"])  # and what is no link is asked about at once
     monkeypatch.setattr(
         "prior_reinforce.commands.workspace.answer_to", lambda question: next(answers)
     )
     status, out, err = run("new", tmp_path / "w", "--robot", tmp_path / "arm.urdf")
     assert status == 0, err
     assert out.count("ends in l2, r2") == 3
+    assert "no link '2r'" in out
     with Workspace(tmp_path / "w") as workspace:
         assert workspace.manifest.robot.joint_names == ("r_a", "r_b")
 

@@ -102,14 +102,16 @@ class New(NewWorkspace):
             unclear = error
         print(unclear)
 
-        def read(said: str) -> str:
+        def read(said: str) -> New:
             if not (tip := said.strip() or unclear.proposed):
                 raise unclear
-            return tip
+            asked = replace(self, tip=tip)
+            asked.described(Path(self.robot))  # a slip is asked about again
+            return asked
 
         proposed = f" [{unclear.proposed}]" * bool(unclear.proposed)
         question = f"link that is the flange, or Ctrl-C to run new with other options{proposed}: "
-        return replace(self, tip=until_read(partial(answer_to, question), read))
+        return until_read(partial(answer_to, question), read)
 
     def _asked(self) -> New:
         """The same with what a person at a terminal says of the object, and of the box."""
