@@ -83,8 +83,7 @@ def as_plans(
 def as_outcomes(values: ArrayLike, n_plans: int) -> Points:
     """Return the outcomes of demonstrations as a fresh, read-only float64 array.
 
-    Raises:
-        InvalidDemonstrationsError: Wrong shape, none, or values that are not finite.
+    InvalidDemonstrationsError for a wrong shape, none, or values that are not finite.
     """
     outcomes = _as_rows(values, InvalidDemonstrationsError, "outcomes", None)
     if len(outcomes) != n_plans:
@@ -100,9 +99,8 @@ def as_outcomes(values: ArrayLike, n_plans: int) -> Points:
 def check_spread(outcomes: Points) -> None:
     """Do nothing if outcomes span all their k dimensions: any goal among them can be asked for.
 
-    Raises:
-        InvalidDemonstrationsError: A component is the same in all, or they lie in a subspace (on
-            one line when k = 2).
+    InvalidDemonstrationsError if a component is the same in all, or they lie in a subspace (on one
+    line when k = 2).
     """
     n, k = outcomes.shape
     spread = np.ptp(outcomes, axis=0)
@@ -124,8 +122,7 @@ def check_spread(outcomes: Points) -> None:
 def as_conditions(values: ArrayLike, outcome_dim: int) -> Points:
     """Return conditions, shape (n, k), any n, as a fresh float64 array.
 
-    Raises:
-        InvalidGoalError: Wrong shape, or not finite.
+    InvalidGoalError for a wrong shape, or what is not finite.
     """
     return _as_rows(values, InvalidGoalError, "conditions", outcome_dim)
 
@@ -133,8 +130,7 @@ def as_conditions(values: ArrayLike, outcome_dim: int) -> Points:
 def as_goal(values: ArrayLike, outcome_names: Sequence[str]) -> Point:
     """Return a goal as a fresh float array, of as many components as there are names.
 
-    Raises:
-        InvalidGoalError: Wrong shape, or not finite.
+    InvalidGoalError for a wrong shape, or what is not finite.
     """
     k = len(outcome_names)
     size = f"the demonstrations' outcomes have {k} components {tuple(outcome_names)}"
@@ -144,8 +140,7 @@ def as_goal(values: ArrayLike, outcome_names: Sequence[str]) -> Point:
 def as_error(values: ArrayLike, outcome_dim: int) -> Point:
     """Return a perceived error, outcome minus goal, as a fresh float array.
 
-    Raises:
-        InvalidFeedbackError: Wrong shape, or not finite.
+    InvalidFeedbackError for a wrong shape, or what is not finite.
     """
     size = f"an error is {outcome_dim} numbers, outcome minus goal"
     remedy = "void the trial if nothing was seen"

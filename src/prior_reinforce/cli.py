@@ -177,8 +177,7 @@ def read(kind: type[AnyCommand], program: str, args: list[str]) -> AnyCommand:
 def _take_plugins(args: list[str]) -> list[str]:
     """Take every `--plugins MODULE` out of a command line, and return the modules.
 
-    Raises:
-        ConfigurationError: The last one names none.
+    ConfigurationError if the last one names none.
     """
     modules = []
     while _PLUGINS in args:
@@ -210,8 +209,7 @@ def _suggested(word: str, known: Iterable[str]) -> str:
 def _in_one_line(program: str) -> Iterator[None]:
     """Say in one line what is wrong with a command line; tyro draws a box. Help is shown tidied.
 
-    Raises:
-        ConfigurationError: It is wrong.
+    ConfigurationError if it is wrong.
     """
     box, shown = io.StringIO(), io.StringIO()
     shown.isatty = sys.stdout.isatty  # type: ignore[method-assign]
@@ -272,8 +270,7 @@ def _tidied(shown: str) -> str:
 def _check_values(given: object, name: str = "") -> None:
     """Refuse numbers that no seed, number of trials or size can be, and paths that move the cursor.
 
-    Raises:
-        ConfigurationError: One is given.
+    ConfigurationError if one is given.
     """
     if is_dataclass(given):
         for each in fields(given):

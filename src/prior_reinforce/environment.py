@@ -204,8 +204,7 @@ class Task(ABC):
 def make_renderer(model: mujoco.MjModel, width: int, height: int) -> mujoco.Renderer:
     """Make a renderer of `width` x `height` pixels; its `close` frees the graphics memory.
 
-    Raises:
-        RenderingUnavailableError: There is no OpenGL on this machine.
+    RenderingUnavailableError if there is no OpenGL on this machine.
     """
     import mujoco
 

@@ -49,8 +49,7 @@ def missing_extra(error: ImportError) -> MissingExtraError | None:
 def check_installed(library: str) -> None:
     """Do nothing if a library of `EXTRA_OF` is installed; it is not imported for that.
 
-    Raises:
-        MissingExtraError: It is not.
+    MissingExtraError if it is not.
     """
     if importlib.util.find_spec(library) is None:
         raise _missing(library)

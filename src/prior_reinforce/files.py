@@ -55,8 +55,7 @@ def sha256(content: bytes) -> str:
 def sha256_of_folder(folder: Path) -> str:
     """Return the hash of the names and contents of a folder's files; hidden files do not count.
 
-    Raises:
-        FileFormatError: A file cannot be read.
+    FileFormatError if a file cannot be read.
     """
     digest = hashlib.sha256()
     try:
@@ -194,8 +193,7 @@ def write_once(path: Path, content: bytes) -> Path:
 def named_disk_errors(folder: Path) -> Iterator[None]:
     """Turn a full disk or a read-only folder into one line.
 
-    Raises:
-        WorkspaceError: The disk is full, or the folder cannot be written to.
+    WorkspaceError if the disk is full, or the folder cannot be written to.
     """
     try:
         yield
@@ -236,8 +234,7 @@ def refuse_foreign(path: Path, mark: str) -> None:
 def claim_folder(folder: Path) -> None:
     """Make a folder for results, or take one that was claimed so: what is in it may be replaced.
 
-    Raises:
-        WorkspaceError: It holds what this program did not write, or cannot be written to.
+    WorkspaceError if it holds what this program did not write, or cannot be written to.
     """
     with named_disk_errors(folder):
         claimed = (folder / _CLAIM).exists()
@@ -253,8 +250,7 @@ def claim_folder(folder: Path) -> None:
 def check_path(path: Path) -> Path:
     """Return a path that a person named, unless printing it would move the cursor.
 
-    Raises:
-        ConfigurationError: It would.
+    ConfigurationError if it would.
     """
     if any(unicodedata.category(char) == "Cc" for char in str(path)):
         raise ConfigurationError(f"the path {path} holds control characters; rename it")
@@ -264,9 +260,7 @@ def check_path(path: Path) -> Path:
 def require_inside(path: Path, folder: Path) -> Path:
     """Return a path within a folder, unless a link leads it out.
 
-    Raises:
-        FileFormatError: A link does: who gave the folder away would have other files read or
-            written.
+    FileFormatError if a link does: who gave the folder away would have other files read or written.
     """
     if not path.resolve().is_relative_to(folder.resolve()):
         raise FileFormatError(
@@ -303,8 +297,7 @@ def _unfinished(path: Path) -> Iterator[Path]:
 def _link(finished: Path, path: Path) -> None:
     """Give a finished file its name; unlike renaming, this fails where a file is there already.
 
-    Raises:
-        FileExistsError: A file of that name is there.
+    FileExistsError if a file of that name is there.
     """
     try:
         os.link(finished, path)

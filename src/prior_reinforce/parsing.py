@@ -224,8 +224,7 @@ def read_uncertain_place(
 ) -> tuple[Point, float]:
     """Read a place, and the standard deviation that may follow it: `92cm 10cm +- 2cm`.
 
-    Raises:
-        InvalidFeedbackError: As `read_place` does, or a `+-` for components of several units.
+    InvalidFeedbackError as in `read_place`, or if a `+-` is for components of several units.
     """
     said, *spread = re.split(PLUS_MINUS, text, maxsplit=1)
     place, of_sd = read_place(said, form, shown), OutcomeFormat(("+-",), form.units[:1])
@@ -239,11 +238,9 @@ def read_place(text: str, form: OutcomeFormat, shown: ArrayLike = 0.0) -> Point:
     """Read a place from numbers in the outcome's units, numbers with a unit, or words.
 
     For instance `0.92 0.10`, `92cm 10cm`, `92 10 cm`, `x 92cm, y 10cm`, or `92cm ahead, 10cm left`;
-    beside words, a number without one is the component in that position: `92cm, 10cm left`.
-    `shown` as for `as_place`.
-
-    Raises:
-        InvalidFeedbackError: It is none of these, has a `+-`, or is farther than any arm throws.
+    beside words, a number without one is the component in that position: `92cm, 10cm left`. `shown`
+    as for `as_place`. InvalidFeedbackError if it is none of these, has a `+-`, or is farther than
+    any arm throws.
     """
     if re.search(PLUS_MINUS, text):
         raise InvalidFeedbackError(f"cannot read {text!r} as one place; leave out the +-")

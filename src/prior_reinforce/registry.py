@@ -163,9 +163,7 @@ def load_plugins(*modules: str) -> None:
     """Import modules that register classes of one's own, and those that `PLUGINS` names.
 
     Programs that are started from here, such as an executor's, are told of them by that variable.
-
-    Raises:
-        ConfigurationError: There is no such module.
+    ConfigurationError if there is no such module.
     """
     named = dict.fromkeys(filter(None, (*os.environ.get(PLUGINS, "").split(","), *modules)))
     for name in named:
@@ -184,8 +182,7 @@ def load_plugins(*modules: str) -> None:
 def parse_choice(choice: str) -> tuple[str, dict[str, str]]:
     """Split `name,setting=value,...` into the name and its settings.
 
-    Raises:
-        ConfigurationError: No text, a setting without a value, or one given twice.
+    ConfigurationError for no text, a setting without a value, or one given twice.
     """
     if not isinstance(choice, str):
         raise ConfigurationError(f"a choice is a name such as 'auto', got {choice!r}; give one")

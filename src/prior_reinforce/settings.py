@@ -31,8 +31,7 @@ class Checked:
     def __post_init__(self) -> None:
         """Check every setting by its annotation.
 
-        Raises:
-            ConfigurationError: One is of another type, or outside its range.
+        ConfigurationError if one is of another type, or outside its range.
         """
         hints = get_type_hints(type(self), include_extras=True)
         for each in fields(self):

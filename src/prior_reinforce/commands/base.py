@@ -57,9 +57,7 @@ def find_workspace(words: tuple[str, ...]) -> tuple[Path, tuple[str, ...]]:
 
     Within a workspace the words are about it, unless the first one names another; a number never
     does (a folder that is called 3 is `./3`). Elsewhere the first word is the folder.
-
-    Raises:
-        ConfigurationError: None is named, and the current folder is in none.
+    ConfigurationError if none is named, and the current folder is in none.
     """
     here = workspace_around(Path())
     if words and (here is None or _names_workspace(words[0])):
@@ -86,9 +84,7 @@ def trial_and_rest(
     """Return the trial that the first word numbers, and the other words.
 
     Where it is no number, the trial that waits; or, with `told`, the latest that was told.
-
-    Raises:
-        ConfigurationError: None is numbered, and there is no such trial.
+    ConfigurationError if none is numbered, and there is no such trial.
     """
     if words and re.fullmatch(r"-?\d{1,9}", words[0], re.ASCII):
         return int(words[0]), words[1:]

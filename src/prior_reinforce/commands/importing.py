@@ -219,8 +219,7 @@ class Import(OnWorkspace):
 def _settle(ambiguities: Unclear, *, at_terminal: bool) -> None:
     """Let a person at the terminal confirm the guesses.
 
-    Raises:
-        UnclearUnitsError: Not confirmed, or there is no terminal.
+    UnclearUnitsError if they are not confirmed, or there is no terminal.
     """
     try:
         raise_if_ambiguous(ambiguities)

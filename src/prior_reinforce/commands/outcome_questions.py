@@ -94,8 +94,7 @@ def ask_for_outcomes(
 def ask_place(ask: Callable[[], str], form: OutcomeFormat, *words: str) -> Place | str:
     """Ask until the answer is a place with its standard deviation (0 if none), or one of `words`.
 
-    Raises:
-        EOFError: `ask` gets no answer.
+    EOFError if `ask` gets no answer.
     """
 
     def read(text: str) -> Place | str:

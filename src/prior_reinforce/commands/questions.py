@@ -21,8 +21,7 @@ types in less, and a network may bring what was typed before so late."""
 def answer_to(question: str) -> str:
     """Ask the person at the terminal for data, on standard error; it may be typed or piped ahead.
 
-    Raises:
-        EOFError: No answer came.
+    EOFError if no answer comes.
     """
     with redirect_stdout(sys.stderr):
         return input(question)
@@ -31,8 +30,7 @@ def answer_to(question: str) -> str:
 def until_read(ask: Callable[[], str], read: Callable[[str], T]) -> T:
     """Ask until an answer can be read; what is wrong with one is said.
 
-    Raises:
-        EOFError: `ask` gets no answer.
+    EOFError if `ask` gets no answer.
     """
     while True:
         said = ask()
@@ -46,11 +44,8 @@ def answer_after(question: str, prompt: str) -> str:
     """Return what the person at the terminal types after the question is shown, in lower case.
 
     The question is written to the terminal that answers it, whatever is redirected; what was typed
-    before the prompt appears is thrown away.
-
-    Raises:
-        ConfigurationError: The input is no terminal, or what is typed ahead cannot be thrown away.
-        EOFError: No answer came.
+    before the prompt appears is thrown away. ConfigurationError if the input is no terminal, or
+    what is typed ahead cannot be thrown away; EOFError if no answer comes.
     """
     try:
         import termios
@@ -97,8 +92,7 @@ def agrees(question: str, answer: str = "yes") -> bool:
 def _show(terminal: int, text: str) -> None:
     """Write to the terminal that the input comes from.
 
-    Raises:
-        ConfigurationError: It is open for reading alone.
+    ConfigurationError if it is open for reading alone.
     """
     try:
         with open(terminal, "w", closefd=False, errors="replace") as screen:

@@ -157,11 +157,7 @@ def _by_keys(watch: Watch, session: _Session) -> None:
 
 
 def _state(watch: Watch) -> GuidedState:
-    """The next state.
-
-    Raises:
-        ConfigurationError: None comes.
-    """
+    """The next state; ConfigurationError if none comes."""
     state = watch.next(_SILENT)
     if state is None:
         raise ConfigurationError(f"the arm said nothing for {_SILENT:g} s; record again")

@@ -66,9 +66,8 @@ class OnTask:
     def open(self) -> tuple[Task, Demonstrations]:
         """Make the task and load the demonstrations.
 
-        Raises:
-            ConfigurationError: An unknown task or prior set, or another plan format.
-            FileFormatError: No such file.
+        ConfigurationError for an unknown task or prior set, or another plan format; FileFormatError
+        if there is no such file.
         """
         task, given = make_task(self.task), self.demonstrations
         if not (given.endswith(".npz") or Path(given).is_file()):

@@ -176,8 +176,7 @@ def _warn_of_its_execution(now: Standing, number: int) -> None:
 def read_seen(text: str, goal: Goal) -> Reading | Point:
     """Read outcome minus goal, in the outcome's units, from words or numbers.
 
-    Raises:
-        InvalidFeedbackError: It is neither, or another number of numbers.
+    InvalidFeedbackError if it is neither, or another number of numbers.
     """
     form, k = goal.format, goal.format.outcome_dim
     numbers = read_numbers(with_points(text, k))
@@ -203,8 +202,7 @@ def read_seen(text: str, goal: Goal) -> Reading | Point:
 def read_landed(text: str, goal: Goal) -> Reading:
     """Read outcome minus goal, in the outcome's units, from where the object ended.
 
-    Raises:
-        InvalidFeedbackError: It is no place.
+    InvalidFeedbackError if it is no place.
     """
     form, k = goal.format, goal.format.outcome_dim
     numbers = read_numbers(with_points(text, k))

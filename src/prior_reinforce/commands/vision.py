@@ -22,9 +22,8 @@ Vlm = Annotated[
 def model_of(file: Path | None, folder: Path | None = None) -> VisionLanguageModelConfig:
     """Return which model looks: that of a file, else of a workspace's manifest, else the default.
 
-    Raises:
-        FileFormatError: There is no such file, or it has no section [vlm].
-        ConfigurationError: An unknown setting, or a value out of range.
+    FileFormatError if there is no such file, or it has no section [vlm]; ConfigurationError for an
+    unknown setting, or a value out of range.
     """
     if file is None and folder is None:
         return VisionLanguageModelConfig()

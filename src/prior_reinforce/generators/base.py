@@ -252,11 +252,7 @@ class Wrapper(Generator):
     """The one that is wrapped."""
 
     def __init__(self, generator: Generator) -> None:
-        """Wrap a generator.
-
-        Raises:
-            ConfigurationError: It is wrapped in the same way already.
-        """
+        """Wrap a generator; ConfigurationError if it is wrapped in the same way already."""
         inner: Generator | None = generator
         while isinstance(inner, Wrapper):
             if isinstance(inner, type(self)):

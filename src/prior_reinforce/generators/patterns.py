@@ -87,8 +87,7 @@ def patterns(demonstrations: Demonstrations) -> tuple[tuple[int, ...], ...]:
 def motion_vectors(demonstrations: Demonstrations) -> _Motions:
     """Return how demonstrations move, on a phase that starts where their motions do.
 
-    Raises:
-        InvalidDemonstrationsError: None of them moves.
+    InvalidDemonstrationsError if none of them moves.
     """
     decomposition = decompose(demonstrations, "start")
     shapes = decomposition.shapes

@@ -61,9 +61,7 @@ class Reach:
         """Return the goal itself if it can be reached, else the nearest found that can.
 
         It lies on the line from the nearest of the goals that can be reached; as it is said.
-
-        Raises:
-            OutOfReachError: None of the goals can be reached, and the goal cannot.
+        OutOfReachError if neither one of the goals can be reached nor the goal.
         """
         wanted = np.asarray(goal, dtype=np.float64)
         if not (why := refusal(generator, wanted, check)):

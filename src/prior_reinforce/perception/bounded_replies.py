@@ -35,9 +35,7 @@ class BoundedClient(openai.DefaultHttpxClient):
     ) -> httpx.Response:
         """Send a request; what it raises is also raised for an answer beyond a bound.
 
-        Raises:
-            httpx.ReadTimeout: It took longer.
-            EndpointError: It is larger.
+        httpx.ReadTimeout if it takes longer, EndpointError if it is larger.
         """
         answers: SimpleQueue[httpx.Response | Exception] = SimpleQueue()
         send = super().send

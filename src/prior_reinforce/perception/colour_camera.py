@@ -56,10 +56,8 @@ class ColourCamera(VisionLanguageModel):
         """Make the camera, as `VisionLanguageModel` does; nothing is drawn yet.
 
         Of `config`, family and votes are used, and no endpoint. A share `outlier_rate` of answers,
-        drawn from `seed`, has a box of the right size that lies anywhere.
-
-        Raises:
-            ConfigurationError: There is no scene, or the rate is no share.
+        drawn from `seed`, has a box of the right size that lies anywhere. ConfigurationError if
+        there is no scene, or the rate is no share.
         """
         config = config or VisionLanguageModelConfig()
         client = ColourClient(config.family, outlier_rate=outlier_rate, seed=seed)
@@ -122,8 +120,7 @@ def say_box(box: Box | None, size: tuple[int, int], words: str, family: Family) 
 def find_by_colour(picture: Picture, words: str) -> Box | None:
     """Find the box, in pixels, around what has the colour that the words name; None if nothing has.
 
-    Raises:
-        ConfigurationError: The words name none of `COLOURS`, or several.
+    ConfigurationError if the words name none of `COLOURS`, or several.
     """
     from PIL import Image
     from scipy import ndimage

@@ -31,10 +31,8 @@ def stored_turn(path: Path) -> int:
 def read_picture(source: Path | BinaryIO) -> Picture:
     """Read a PNG or a JPEG: RGB, upright as the camera says; of several frames the first.
 
-    Pictures of more than 8 bits are brightened until the brightest pixel is white.
-
-    Raises:
-        FileFormatError: It is neither, is damaged, or has too many pixels.
+    Pictures of more than 8 bits are brightened until the brightest pixel is white. FileFormatError
+    if it is neither, is damaged, or has too many pixels.
     """
     from PIL import Image, ImageOps
 

@@ -177,9 +177,8 @@ class OpenAIClient:
     def __init__(self, config: VisionLanguageModelConfig) -> None:
         """Prepare the connection; nothing is sent yet.
 
-        Raises:
-            MissingExtraError: The extra [vlm] is not installed.
-            ConfigurationError: The variable that should hold the key is not set.
+        MissingExtraError if the extra [vlm] is not installed, ConfigurationError if the variable
+        that should hold the key is not set.
         """
         check_installed("openai")
         import openai
@@ -398,8 +397,7 @@ def _extra_body(config: VisionLanguageModelConfig) -> dict[str, Any]:
 def without_secrets(url: str) -> str:
     """Return an address without a user's name, password, query and fragment.
 
-    Raises:
-        ConfigurationError: It is no address; what may hold a secret then is not shown.
+    ConfigurationError, which does not show it, if it is no address.
     """
     try:
         address = urlsplit(url)

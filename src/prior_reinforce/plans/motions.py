@@ -81,8 +81,7 @@ class Plan:
     def __post_init__(self) -> None:
         """Copy and check the frames.
 
-        Raises:
-            InvalidPlanError: Wrong shape, or values that are not finite.
+        InvalidPlanError for a wrong shape, or values that are not finite.
         """
         actions = as_plans(self.actions, self.format.action_dim, name="plan", single=True)
         object.__setattr__(self, "actions", actions)

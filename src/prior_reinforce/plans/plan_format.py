@@ -38,8 +38,7 @@ class PlanFormat:
     def __post_init__(self) -> None:
         """Check the format.
 
-        Raises:
-            InvalidPlanError: No names, repeated names, or another number of units than of names.
+        InvalidPlanError for no names, repeated names, or another number of units than of names.
         """
         for name in ("names", "units", "per_plan", "periodic"):
             if isinstance(given := getattr(self, name), str):

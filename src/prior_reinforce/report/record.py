@@ -98,9 +98,8 @@ class AdaptationRecord:
     def __post_init__(self) -> None:
         """Check that everything fits together.
 
-        Raises:
-            InvalidGoalError: The goal has a wrong shape, or is not finite.
-            ConfigurationError: There are not as many outcomes as trials, or the tolerance is none.
+        InvalidGoalError if the goal has a wrong shape, or is not finite; ConfigurationError if
+        there are not as many outcomes as trials, or the tolerance is none.
         """
         object.__setattr__(self, "goal", as_goal(self.goal, self.format.names))
         if self.outcomes is not None and len(self.outcomes) != len(self.trials):

@@ -157,10 +157,9 @@ class InUse:
     ) -> tuple[Asked, Frames, Any]:
         """The next trial, its plan and verdict: as wanted, or the last that passes towards that.
 
-        Raises:
-            OutOfReachError: No plan may be moved to the goal, and this one was tried and missed.
-            RobotLimitError: It does not pass, and the goal's own plan does not either, or the last
-                that passes was tried and missed.
+        OutOfReachError if no plan may be moved to the goal, and this one was tried and missed;
+        RobotLimitError if it does not pass, and the goal's own plan does not either, or the last
+        that passes was tried and missed.
         """
 
         def check(plan: Frames, condition: Point) -> str:
@@ -237,11 +236,7 @@ def _missed(state: SessionState, condition: Point) -> int:
 
 
 def latest_goal(state: SessionState) -> Goal:
-    """The goal that is worked on.
-
-    Raises:
-        WorkspaceError: None is set.
-    """
+    """The goal that is worked on; WorkspaceError if none is set."""
     if state.goal is None:
         raise WorkspaceError("no goal is set; set one (Session.set_goal, or: prior-reinforce goal)")
     return state.goal
@@ -255,8 +250,7 @@ def _loaded(given: Any) -> Any:
 def generated(generators: Sequence[Generator], conditions: Sequence[Point]) -> list[Frames]:
     """Return a plan for each condition, with one call of each generator.
 
-    Raises:
-        InvalidPlanError: A generator gives what is no number.
+    InvalidPlanError if a generator gives what is no number.
     """
     plans: dict[int, Frames] = {}
     for generator in {id(each): each for each in generators}.values():

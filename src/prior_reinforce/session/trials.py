@@ -204,11 +204,7 @@ class SessionState:
         return self.trials_of(len(self.goals)) if self.goals else ()
 
     def trial(self, number: int) -> Trial:
-        """Return a trial of any goal as it stands.
-
-        Raises:
-            TrialStateError: There is no such trial.
-        """
+        """Return a trial of any goal as it stands; TrialStateError if there is no such trial."""
         if not isinstance(number, Integral) or isinstance(number, bool):
             raise TrialStateError(
                 f"a trial's number is a whole number, got {number!r}; give .number"
@@ -238,11 +234,7 @@ class SessionState:
         return [trial for trial in self.trials if _teaches(trial, goal, model)]
 
     def refuse_open_trial(self, doing: str) -> None:
-        """Do nothing unless a trial waits to be told.
-
-        Raises:
-            TrialStateError: One does.
-        """
+        """Do nothing unless a trial waits to be told; TrialStateError if one does."""
         trial = self.open_trial
         if trial is not None:
             raise TrialStateError(
@@ -250,11 +242,7 @@ class SessionState:
             )
 
     def add(self, entry: Entry) -> None:
-        """Take in the next event.
-
-        Raises:
-            WorkspaceError: It cannot follow the others.
-        """
+        """Take in the next event; WorkspaceError if it cannot follow the others."""
         try:
             self._apply(entry.event, entry.time)
         except (IndexError, ValueError, PriorReinforceError) as error:
@@ -345,8 +333,7 @@ class Log:
     def state(self) -> SessionState:
         """What happened so far, whoever wrote it.
 
-        Raises:
-            WorkspaceError: The events do not fit together, or cannot be read.
+        WorkspaceError if the events do not fit together, or cannot be read.
         """
         return self._state
 

@@ -77,9 +77,8 @@ def estimate_by_eye(
 ) -> Reading:
     """The simulated operator, who estimates by eye (`Eye`) what could not be read.
 
-    Raises:
-        EndpointError: Nothing was asked of a picture: what a person sees is no result of a model
-            that never answered.
+    EndpointError if nothing was asked of a picture: what a person sees is no result of a model that
+    never answered.
     """
     if isinstance(failure, EndpointError):
         raise failure

@@ -62,8 +62,7 @@ def problem(status: int, error: str) -> JSONResponse:
 def token_of(folder: Path) -> str:
     """Return a workspace's secret; made if there is none whole, and kept, so that pages stay valid.
 
-    Raises:
-        FileFormatError: It is a link out of the workspace.
+    FileFormatError if it is a link out of the workspace.
     """
     path = require_inside(folder / TOKEN_FILE, folder)
     if not path.is_file() or not _TOKEN.fullmatch(path.read_bytes()):

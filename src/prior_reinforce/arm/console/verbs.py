@@ -332,8 +332,7 @@ class Verbs:
     def as_seen(self, seen: int) -> Iterator[None]:
         """Hold the workspace, if it is still as it was seen.
 
-        Raises:
-            TrialStateError: It is not; the message says what happened.
+        TrialStateError, which says what happened, if it is not.
         """
         with self._lock:
             entries = self.workspace.events

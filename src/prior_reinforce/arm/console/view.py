@@ -70,9 +70,7 @@ class ConsoleState(StatusView, frozen=True, kw_only=True):
 def state_of(workspace: Workspace) -> ConsoleState:
     """Return what the page shows now.
 
-    Raises:
-        WorkspaceError, ConfigurationError: See `Workspace.state`.
-        FileFormatError: The demonstrations are damaged.
+    FileFormatError if the demonstrations are damaged; else as `Workspace.state`.
     """
     now, entries, shown = workspace.standing, workspace.events, np.empty((0, 0))
     if now.state.demonstrations is not None:
@@ -141,9 +139,7 @@ class MotionView(Struct):
 def motion_of(workspace: Workspace, number: int) -> MotionView:
     """Return a trial's plan with the gate's report of when it was asked for.
 
-    Raises:
-        TrialStateError: There is no such trial.
-        FileFormatError: Its plan is lost or damaged.
+    TrialStateError if there is no such trial, FileFormatError if its plan is lost or damaged.
     """
     bounds: dict[int, tuple[float, float]]
     trial = workspace.state.trial(number)

@@ -20,11 +20,7 @@ _PLACE = re.compile(f"{re.escape(PLAN)}|{re.escape(RESULT)}")
 
 
 def split(command: str) -> list[str]:
-    """Split a text as a shell would.
-
-    Raises:
-        ConfigurationError: Quotes that do not match.
-    """
+    """Split a text as a shell would; ConfigurationError if quotes do not match."""
     try:
         return shlex.split(command)
     except ValueError as error:
@@ -36,8 +32,7 @@ def split(command: str) -> list[str]:
 def split_command(command: str, plan: Path, result: Path = Path("result")) -> tuple[str, ...]:
     """Program and arguments, `{plan}` and `{result}` replaced by paths within one argument.
 
-    Raises:
-        ConfigurationError: Quotes that do not match, no program, or no `{plan}`.
+    ConfigurationError if quotes do not match, or there is no program or no `{plan}`.
     """
     arguments = split(command)
     if not any(PLAN in argument for argument in arguments[1:]):
@@ -62,9 +57,8 @@ def without_arguments(command: str) -> str:
 def check_command(command: str, *, time_limit: float) -> None:
     """Do nothing if a command and its limit could be used; arguments as in `run_command`.
 
-    Raises:
-        ConfigurationError: It cannot be split, names no program that can run, or lacks `{plan}`;
-            the limit is not a positive number; or this is not Linux.
+    ConfigurationError if it cannot be split, names no program that can run, or lacks `{plan}`; the
+    limit is not a positive number; or this is not Linux.
     """
     if not is_positive(time_limit):
         raise ConfigurationError(f"the time limit must be a positive number, got {time_limit!r} s")

@@ -96,8 +96,7 @@ def execute_command(
 ) -> MotionResult:
     """`run_command` under a lock that is held, with an empty folder for `{result}`.
 
-    Raises:
-        ConfigurationError, FileFormatError, KeyboardInterrupt: Nothing has run.
+    If it raises ConfigurationError, FileFormatError or KeyboardInterrupt, nothing has run.
     """
     check_command(command, time_limit=time_limit)
     copy = write_once(_copy_in(folder, plan), plan.verify())

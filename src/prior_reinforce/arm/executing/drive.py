@@ -115,11 +115,7 @@ def program(module: str) -> list[str]:
 
 
 def read_look(folder: Path) -> Look:
-    """Read `look.json`.
-
-    Raises:
-        FileFormatError: The program did not write it.
-    """
+    """Read `look.json`; FileFormatError if the program did not write it."""
     try:
         return msgspec.json.decode((folder / LOOK_FILE).read_bytes(), type=Look)
     except (OSError, ValueError) as error:
@@ -129,9 +125,8 @@ def read_look(folder: Path) -> Look:
 def make_executor(settings: ArmSettings) -> Executor:
     """Connect to an arm.
 
-    Raises:
-        ConfigurationError: There is no such executor or setting, or the arm does not answer.
-        MissingExtraError: Its library is not installed.
+    ConfigurationError if there is no such executor or setting, or the arm does not answer;
+    MissingExtraError if its library is not installed.
     """
     kind, config = _class_and_config(settings)
     try:
@@ -143,8 +138,7 @@ def make_executor(settings: ArmSettings) -> Executor:
 def guiding_of(settings: ArmSettings) -> Guiding:
     """What being guided would do to an arm; it is not connected to.
 
-    Raises:
-        ConfigurationError: There is no such executor or setting.
+    ConfigurationError if there is no such executor or setting.
     """
     kind, config = _class_and_config(settings)
     return kind.guiding(config)
@@ -158,8 +152,7 @@ def _class_and_config(settings: ArmSettings) -> tuple[type[Executor], Any]:
 def arms_columns(form: PlanFormat, arm: ArmDescription) -> list[int]:
     """The arm's channel for each of a plan's columns.
 
-    Raises:
-        InvalidPlanError: A column is no channel of the arm, is in another unit, or two are one.
+    InvalidPlanError if a column is no channel of the arm, is in another unit, or two are one.
     """
     channels = []
     for name, unit in zip(form.names, form.units, strict=True):
@@ -182,8 +175,7 @@ def approach(
 ) -> Plan:
     """The slow way from one pose to another: a minimum-jerk motion of all channels together.
 
-    Raises:
-        InvalidPlanError: A channel is to move in a unit in which no slow speed is known.
+    InvalidPlanError if a channel is to move in a unit in which no slow speed is known.
     """
     far = np.abs(first - pose)
     duration = _SHORTEST
@@ -273,8 +265,7 @@ class _Prepared:
     def check(self, name: str, motion: Plan) -> None:
         """Hold a motion against the arm and, in the plan's own columns, the gate, box and all.
 
-        Raises:
-            RobotLimitError: It is refused; the message begins with its name.
+        RobotLimitError, which begins with its name, if it is refused.
         """
         self._executor.check(motion)
         if self._request.limits is None:

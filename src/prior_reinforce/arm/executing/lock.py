@@ -97,8 +97,7 @@ def executing_lock(
 def is_executing(folder: Path) -> bool:
     """Whether a trial of the workspace in `folder` is being executed right now.
 
-    Raises:
-        WorkspaceError: The folder cannot be opened, or its file system has no locks.
+    WorkspaceError if the folder cannot be opened, or its file system has no locks.
     """
     with _opened(folder) as descriptor:
         return not _flock(folder, descriptor, shared=True) or bool(marked(_name_of_folder(folder)))
@@ -107,8 +106,7 @@ def is_executing(folder: Path) -> bool:
 def programs_executing(folder: Path) -> list[tuple[int, str]]:
     """Process id and command line of what executes a trial of a workspace, supervisors left out.
 
-    Raises:
-        ConfigurationError: No processes can be looked at.
+    ConfigurationError if no processes can be looked at.
     """
     found = []
     for pid in marked(_name_of_folder(folder)):
@@ -126,11 +124,8 @@ def stop_executing(folder: Path) -> None:
 
     Its supervisor is asked, which asks the command, once, kills it after the grace, and notes how
     it ended; or whatever is left of both is asked. What else runs after twice the grace is killed,
-    and a supervisor that hangs, much later: on a busy computer it may only be slow.
-
-    Raises:
-        WorkspaceError: The stop cannot be noted.
-        ConfigurationError: What runs cannot be found.
+    and a supervisor that hangs, much later: on a busy computer it may only be slow. WorkspaceError
+    if the stop cannot be noted, ConfigurationError if what runs cannot be found.
     """
     try:
         _note_stop(folder)
@@ -179,8 +174,7 @@ def _stop_what_runs(name: str) -> None:
 def marked(name: str) -> list[int]:
     """Processes whose environment bears a name; those of other users cannot be looked at.
 
-    Raises:
-        ConfigurationError: No processes can be looked at.
+    ConfigurationError if no processes can be looked at.
     """
     if not sys.platform.startswith("linux"):
         return []  # nothing is executed there
@@ -203,8 +197,7 @@ def marked(name: str) -> list[int]:
 def stop_marked(name: str, kill_at: float) -> None:
     """Stop all processes that bear a name, from a `time.monotonic` on by SIGKILL; wait for them.
 
-    Raises:
-        ConfigurationError: No processes could be looked at until then.
+    ConfigurationError if no processes could be looked at until then.
     """
     asked: set[tuple[int, int]] = set()
     while True:

@@ -79,8 +79,7 @@ class MotionResult(msgspec.Struct, frozen=True, kw_only=True):
 def read_driver_result(folder: Path) -> DriverResult | None:
     """Read `result.json` of a result folder; None where there is none.
 
-    Raises:
-        FileFormatError: It is no such file.
+    FileFormatError if it is no such file.
     """
     path = folder / RESULT_FILE
     if not path.is_file() or path.is_symlink():

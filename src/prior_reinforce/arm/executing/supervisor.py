@@ -72,11 +72,7 @@ def main(request: dict[str, Any]) -> None:
 
 
 def _start(request: dict[str, Any], stop_asked: list[int]) -> _Watched:
-    """Start the command, once we are told to.
-
-    Raises:
-        Exception: Nothing has run.
-    """
+    """Start the command, once we are told to; nothing has run if it raises."""
     libc = ctypes.CDLL(None, use_errno=True)
     if libc.prctl(_SET_CHILD_SUBREAPER, 1, 0, 0, 0) != 0:
         raise OSError(ctypes.get_errno(), "cannot adopt what a command detaches")
@@ -303,8 +299,7 @@ def shout(text: str) -> None:
 def processes() -> list[int]:
     """All processes.
 
-    Raises:
-        OSError: They cannot be listed: /proc is missing, or another computer's or container's.
+    OSError if they cannot be listed: /proc is missing, or another computer's or container's.
     """
     if os.readlink("/proc/self") != str(os.getpid()):
         raise FileNotFoundError(errno.ENOENT, "/proc does not list this program")
@@ -314,8 +309,7 @@ def processes() -> list[int]:
 def _descendants() -> dict[int, str]:
     """Names of the processes that descend from this one, by their number.
 
-    Raises:
-        OSError: They cannot be found.
+    OSError if they cannot be found.
     """
     parents: dict[int, tuple[int, str]] = {}
     for pid in processes():

@@ -171,8 +171,7 @@ class UR(Executor):
     ) -> str:
         """Send set points by the controller's clock, and note where it is; why it ended early.
 
-        Raises:
-            RuntimeError: The connection is lost.
+        RuntimeError if the connection is lost.
         """
         state, config = self._state, self._config
         start, last, heard = math.inf, state.getTimestamp(), time.monotonic()

@@ -117,8 +117,7 @@ class Watch:
     def next(self, time_limit: float) -> GuidedState | None:
         """The next state; None if none came within the limit, in [s].
 
-        Raises:
-            ConfigurationError: The arm does not answer any more.
+        ConfigurationError if the arm does not answer any more.
         """
         try:
             state = self._states.get(timeout=time_limit)

@@ -261,12 +261,10 @@ class Recordings:
         They are those `given` (a table, or numbers by episode in the wanted units), a table beside
         the recordings, or the recordings' own. `unit` is of columns that name none, `unclear` what
         else is to be said where there are none; with `may_lack`, none are returned then.
-
-        Raises:
-            ConfigurationError: The given outcomes are not numbers.
-            InvalidDemonstrationsError: There are no outcomes, a component is missing, or a row is
-                of no episode of the source (UnclearUnitsError, where something is unclear).
-            FileFormatError: The table is missing or damaged.
+        ConfigurationError if the given outcomes are not numbers; InvalidDemonstrationsError if
+        there are none, a component is missing, or a row is of no episode of the source
+        (UnclearUnitsError if something is unclear); FileFormatError if the table is missing or
+        damaged.
         """
         others = [] if given is not None else csv.tables_of_outcomes(self.source, self.there)
         own = table_beside(self.outcome_places)

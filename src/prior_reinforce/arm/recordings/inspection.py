@@ -300,11 +300,9 @@ class Inspection:
 def inspect(selection: Selection, wanted: Wanted) -> Inspection:
     """Make plans of recordings, and check each against the robot's limits, once.
 
-    In units that the gate cannot judge, none is checked.
-
-    Raises:
-        InvalidDemonstrationsError: As in `check_held`, `check_scale`, `aligned` and `preprocess`.
-        ConfigurationError: Settings that contradict each other.
+    In units that the gate cannot judge, none is checked. InvalidDemonstrationsError as in
+    `check_held`, `check_scale`, `aligned` and `preprocess`; ConfigurationError if settings
+    contradict each other.
     """
     robot, before = wanted.robot, wanted.before
     check_held(selection.recordings, robot)

@@ -36,12 +36,9 @@ def in_units(
 
     `wanted` None takes the stated units, or metres. `given` is the unit of components whose source
     states none, or of all to confirm an ambiguous one; None takes the wanted unit, or if no arm
-    reaches that far, a plausible one.
-
-    Raises:
-        ConfigurationError: A unit that cannot be converted, `given` has no use, or one `sd` for
-            components of several units.
-        InvalidDemonstrationsError: A stated unit is impossible.
+    reaches that far, a plausible one. ConfigurationError if a unit cannot be converted, `given` has
+    no use, or one `sd` is for several units; InvalidDemonstrationsError if a stated unit is
+    impossible.
     """
     said, where, given = outcomes.units, outcomes.where, given and (known_unit(given) or given)
     wanted = wanted and [known_unit(unit) or unit for unit in wanted]

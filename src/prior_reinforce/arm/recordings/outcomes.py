@@ -364,10 +364,8 @@ def check_rows(
 
     With `others`, rows of none are no mistake unless the table looks numbered from another number.
     Returns the outcomes with the `episodes` and the `word` that hold for the recordings.
-
-    Raises:
-        InvalidDemonstrationsError: A row is of none, or several numbers fit (`telling_word`), or
-            columns differ (`telling_column`).
+    InvalidDemonstrationsError if a row is of none, or several numbers fit (`telling_word`), or
+    columns differ (`telling_column`).
     """
     keys = (outcomes.word, outcomes.episodes), *outcomes.also
     word, rows = telling_column(keys, chosen, there, outcomes.where)
@@ -417,9 +415,7 @@ def outcomes_of(
 
     Episodes are matched by name, else by the number behind the outcomes' `word` or at the end of
     their names (`3` is `demo_003`). `advice` is for who lacks some, of those.
-
-    Raises:
-        InvalidDemonstrationsError: Outcomes that are missing or not finite; each is named.
+    InvalidDemonstrationsError names outcomes that are missing or not finite.
     """
     there = outcomes.episodes
     if missing := missing_outcomes(episodes, outcomes):

@@ -73,8 +73,8 @@ class GateSettings(Checked):
     def __post_init__(self) -> None:
         """Check the settings.
 
-        Raises:
-            ConfigurationError: A value of another type or outside its range, or half a box.
+        ConfigurationError if a value is of another type or outside its range, or there is half a
+        box.
         """
         super().__post_init__()
         if self.beyond_warn > self.beyond_refuse:

@@ -73,8 +73,7 @@ class RobotLimits:
     def __post_init__(self) -> None:
         """Copy and check.
 
-        Raises:
-            ConfigurationError: A wrong number of values, or values that no arm has.
+        ConfigurationError for a wrong number of values, or values that no arm has.
         """
         object.__setattr__(self, "joint_names", tuple(self.joint_names))
         d = len(self.joint_names)
@@ -202,8 +201,7 @@ def missing_joints(
 ) -> tuple[str, ...]:
     """Name the joints without a column (`match_joints`) that plans do not leave out on purpose.
 
-    Raises:
-        ConfigurationError: A joint is said to be absent that the robot has not, or the plan moves.
+    ConfigurationError if a joint is said to be absent that the robot has not, or the plan moves.
     """
     moved = {limits.joint_names[joint] for joint in columns}
     for name in absent:

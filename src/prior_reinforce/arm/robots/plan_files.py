@@ -50,8 +50,7 @@ class PlanFile:
     def verify(self) -> bytes:
         """Return the file's bytes, if they are still what was written.
 
-        Raises:
-            FileFormatError: It is gone, unreadable, or its bytes have another hash.
+        FileFormatError if it is gone, unreadable, or its bytes have another hash.
         """
         try:
             content = self.path.read_bytes()
@@ -98,10 +97,8 @@ def check_plan_path(
 ) -> PlanFileFormat:
     """Return the format that `write_plan` would write; nothing is written.
 
-    Raises:
-        ConfigurationError: An unknown format or suffix.
-        InvalidPlanError: A rate that no plan can be resampled at.
-        WorkspaceError: There is no folder to write to.
+    ConfigurationError for an unknown format or suffix, InvalidPlanError for a rate that no plan can
+    be resampled at, WorkspaceError if there is no folder to write to.
     """
     kind = format or path.suffix.lower().removeprefix(".")
     if kind not in get_args(PlanFileFormat):

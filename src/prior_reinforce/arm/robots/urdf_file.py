@@ -74,8 +74,7 @@ _XACRO = "make a URDF of its xacro: xacro arm.urdf.xacro > arm.urdf"
 def read_joints(path: Path) -> tuple[str, list[Joint], list[str], dict[str, str]]:
     """Read the robot's name, joints, links from the root outwards, and names of links' meshes.
 
-    Raises:
-        FileFormatError: It is no URDF, or its links do not all hang from one root.
+    FileFormatError if it is no URDF, or its links do not all hang from one root.
     """
     if not path.is_file():
         raise FileFormatError(f"no URDF at {path}; give the path of a .urdf file")

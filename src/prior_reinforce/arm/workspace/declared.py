@@ -49,8 +49,7 @@ class DeclaredSymmetry(Struct, frozen=True, forbid_unknown_fields=True):
     ) -> Symmetry:
         """Make it for plans and outcomes of these formats.
 
-        Raises:
-            ConfigurationError: Plans or outcomes are not such that this can be done.
+        ConfigurationError if plans or outcomes are not such that this can be done.
         """
         about: Literal["base"] | tuple[float, float] | None = None
         if self.turns:
@@ -86,8 +85,7 @@ class DeclaredSymmetry(Struct, frozen=True, forbid_unknown_fields=True):
 def read_object(said: str) -> str | tuple[float, float]:
     """Return the `object` that a person says: `carried`, `0.43 0`, `anywhere` or `none`.
 
-    Raises:
-        ConfigurationError: It is none of these.
+    ConfigurationError if it is none of these.
     """
     words = said.replace(",", " ").split()
     if len(words) == 1 and words[0] in WAYS:

@@ -144,8 +144,7 @@ def execute(
 def to_execute(workspace: Workspace, number: int) -> Trial:
     """A trial whose plan was not executed yet.
 
-    Raises:
-        TrialStateError: It was, or the trial is closed.
+    TrialStateError if it was, or the trial is closed.
     """
     state = workspace.state
     trial = state.trial(number)
@@ -160,11 +159,9 @@ def to_execute(workspace: Workspace, number: int) -> Trial:
 def look_at_arm(workspace: Workspace, number: int, arm: ArmSettings, *, speed: float = 1.0) -> Look:
     """Ask the manifest's arm how it stands to a trial's plan, and whether it takes it.
 
-    Nothing moves, and nothing is written down.
-
-    Raises:
-        TrialStateError: It is moved or recorded right now: two programs on one bus clash.
-        ConfigurationError: The arm does not answer, or is another one since.
+    Nothing moves, and nothing is written down. TrialStateError if it is moved or recorded right
+    now, since two programs on one bus clash; ConfigurationError if the arm does not answer, or is
+    another one since.
     """
     text = _command(workspace, arm, "look", speed)
     plan = workspace.plan_file(workspace.state.trial(number))
@@ -201,8 +198,7 @@ def recover(workspace: Workspace) -> Trial | None:
 def note_not_moved(workspace: Workspace) -> None:
     """Note what a person saw of the open trial: the arm did not move, so it may be executed.
 
-    Raises:
-        TrialStateError: It is executing now, or was executed to its end.
+    TrialStateError if it is executing now, or was executed to its end.
     """
     with workspace.log.exclusive():
         now = workspace.standing

@@ -18,9 +18,8 @@ _OWN = (MANIFEST_FILE, JOURNAL_FILE, *_FOLDERS, "demonstrations.png", "outcomes.
 def make_folder(folder: Path, manifest: str) -> None:
     """Make a folder with a manifest; nothing is made if a value in it is wrong.
 
-    Raises:
-        WorkspaceError: The folder holds something already, or cannot be written.
-        FileFormatError, ConfigurationError: See `parse_manifest`.
+    WorkspaceError if the folder holds something already, or cannot be written; else as
+    `parse_manifest`.
     """
     parse_manifest(manifest, folder / MANIFEST_FILE)
     with named_disk_errors(folder):
@@ -33,8 +32,7 @@ def make_folder(folder: Path, manifest: str) -> None:
 def require_new(folder: Path) -> None:
     """Do nothing if a workspace can be made there: the folder is empty, or there is none.
 
-    Raises:
-        WorkspaceError: The folder holds something already.
+    WorkspaceError if the folder holds something already.
     """
     if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
         raise WorkspaceError(f"{folder} exists and is not empty; choose a new folder")
@@ -43,9 +41,7 @@ def require_new(folder: Path) -> None:
 def check_folder(folder: Path) -> None:
     """Do nothing if a folder is a workspace, and no part of it a link out of it.
 
-    Raises:
-        WorkspaceError: It has no manifest.
-        FileFormatError: A part leads out of it.
+    WorkspaceError if it has no manifest, FileFormatError if a part leads out of it.
     """
     for name in _OWN:
         require_inside(folder / name, folder)

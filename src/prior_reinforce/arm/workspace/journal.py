@@ -66,9 +66,8 @@ class Journal(Log):
     def __init__(self, folder: Path, store: Store) -> None:
         """Open the journal in a folder; made if there is none.
 
-        Raises:
-            WorkspaceError: It cannot be opened, is damaged, was written by another version, or is
-                missing beside files that it named.
+        WorkspaceError if it cannot be opened, is damaged, was written by another version, or is
+        missing beside files that it named.
         """
         super().__init__()
         self._state = WorkspaceState()
@@ -142,8 +141,7 @@ class Journal(Log):
     def entries(self) -> Sequence[Entry]:
         """All events, in order; they are read anew only where another program has added some.
 
-        Raises:
-            WorkspaceError: The file is damaged or was replaced, or another version wrote it.
+        WorkspaceError if the file is damaged or was replaced, or another version wrote it.
         """
         self._catch_up()
         return self._entries
@@ -218,10 +216,8 @@ class Journal(Log):
         """Hold the journal for reading and then appending; others wait, and then say so.
 
         Appends inside become durable together when the block ends; none does if it raises. What is
-        not durable yet is no event: `entries` has it once the block has ended.
-
-        Raises:
-            WorkspaceError: Another program holds it, it was replaced, or the disk refuses.
+        not durable yet is no event: `entries` has it once the block has ended. WorkspaceError if
+        another program holds it, it was replaced, or the disk refuses.
         """
         with self._lock:
             with self._named_errors():
@@ -244,8 +240,7 @@ class Journal(Log):
     def append(self, event: Event) -> None:
         """Add an event; call it inside `exclusive`.
 
-        Raises:
-            WorkspaceError: The disk is full, or the folder is read-only.
+        WorkspaceError if the disk is full, or the folder is read-only.
         """
         assert self._connection.in_transaction, "append inside Journal.exclusive"
         now = datetime.now(timezone.utc).isoformat(timespec="milliseconds")

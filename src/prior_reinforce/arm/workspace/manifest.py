@@ -71,8 +71,7 @@ class Manifest:
     def declared(self, form: PlanFormat) -> Symmetry | None:
         """Return the symmetry of plans of a format, if one is declared.
 
-        Raises:
-            ConfigurationError: Such plans cannot be moved so.
+        ConfigurationError if such plans cannot be moved so.
         """
         if self.symmetry is None:
             return None
@@ -81,8 +80,7 @@ class Manifest:
     def check_fit(self, demonstrations: Demonstrations, source: str, path: Path) -> None:
         """Do nothing if demonstrations mean what this manifest, which stands at `path`, says.
 
-        Raises:
-            InvalidDemonstrationsError: They do not.
+        InvalidDemonstrationsError if they do not.
         """
         form, expected = demonstrations.format, self.format
         outcomes = demonstrations.outcome_format
@@ -216,11 +214,7 @@ def workspace_around(folder: Path, *, above: bool = True) -> Path | None:
 
 
 def read_text(path: Path) -> str:
-    """Read a manifest's text.
-
-    Raises:
-        FileFormatError: The file is missing, or is no text.
-    """
+    """Read a manifest's text; FileFormatError if the file is missing, or is no text."""
     try:
         return path.read_text(encoding="utf-8")
     except OSError as error:
@@ -234,9 +228,8 @@ def read_text(path: Path) -> str:
 def parse_manifest(text: str, path: Path) -> Manifest:
     """Check a manifest's text; `path` is where messages say it stands.
 
-    Raises:
-        FileFormatError: It is no TOML.
-        ConfigurationError: A value is missing, unknown, of the wrong kind, or out of range.
+    FileFormatError if it is no TOML; ConfigurationError if a value is missing, unknown, of the
+    wrong kind, or out of range.
     """
     try:
         data = tomllib.loads(text)

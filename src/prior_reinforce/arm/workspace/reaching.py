@@ -32,9 +32,7 @@ def require_reach(workspace: Workspace, goal: ArrayLike) -> None:
     """Do nothing if moved demonstrations can reach a goal within the robot's limits of now.
 
     Nothing is known of it before a model of ours is learned, or without symmetry or robot.
-
-    Raises:
-        OutOfReachError: They cannot; with the nearest goal that they can reach.
+    OutOfReachError, with the nearest goal that they can reach, if they cannot.
     """
     training, form = workspace.state.training, workspace.manifest.outcome_format
     if training is None or workspace.state.stale or workspace.manifest.robot is None:

@@ -156,11 +156,7 @@ class Standing:
 
     @property
     def imported(self) -> DemonstrationsImported:
-        """The demonstrations in use.
-
-        Raises:
-            WorkspaceError: None were imported yet.
-        """
+        """The demonstrations in use; WorkspaceError if none were imported yet."""
         if self.state.demonstrations is None:
             raise WorkspaceError(
                 f"{self.folder} has no demonstrations yet; bring them in with: prior-reinforce "
@@ -172,8 +168,7 @@ class Standing:
     def trained(self) -> ModelTrained:
         """The training of the model in use.
 
-        Raises:
-            WorkspaceError: There is none, or other demonstrations were imported since.
+        WorkspaceError if there is none, or other demonstrations were imported since.
         """
         imported, training = self.imported, self.state.training
         if training is None or training.demonstrations_sha256 != imported.sha256:

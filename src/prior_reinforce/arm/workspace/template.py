@@ -192,8 +192,7 @@ def _section_of(arm: str) -> str:
 def with_columns(text: str, names: Sequence[str], units: Sequence[str]) -> str:
     """Return a manifest's text with the columns of a plan that were not known when it was made.
 
-    Raises:
-        FileFormatError: The section has no line of its own.
+    FileFormatError if the section has no line of its own.
     """
     said = {"names": f"names = {_toml(names)}", "units": f"units = {_toml(units)}"}
     if (section := re.search(r"^[ \t]*\[[ \t]*plan[ \t]*\]", text, re.M)) is None:
@@ -210,8 +209,7 @@ def with_columns(text: str, names: Sequence[str], units: Sequence[str]) -> str:
 def _usual_tolerance(units: Sequence[str]) -> list[float]:
     """1.5 cm in each unit; one number where all are one unit.
 
-    Raises:
-        ConfigurationError: Some are no lengths.
+    ConfigurationError if some are no lengths.
     """
     numbers = [factor("m", unit) for unit in units]
     if None in numbers:

@@ -203,8 +203,7 @@ def execute_step(now: Standing, trial: Trial) -> str:
 def check_open(now: Standing, trial: Trial, verb: Literal["ask", "tell"]) -> None:
     """Refuse to give out a trial that is executing, or to take an outcome of none.
 
-    Raises:
-        TrialStateError: With what comes next.
+    TrialStateError says what comes next.
     """
     number, stage, cut_off = trial.number, now.state.stage(trial), now.state.cut_off
     if verb == "ask" and stage == "executing":

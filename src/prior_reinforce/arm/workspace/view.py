@@ -254,8 +254,7 @@ def trial_view(now: Standing, trial: Trial) -> TrialView:
 def status_view(now: Standing) -> StatusView:
     """Return where a workspace stands.
 
-    Raises:
-        FileFormatError: The demonstrations are missing or damaged.
+    FileFormatError if the demonstrations are missing or damaged.
     """
     state, manifest, outcomes = now.state, now.manifest, now.manifest.outcome_format
     training, form, imported = state.training, manifest.format, state.demonstrations

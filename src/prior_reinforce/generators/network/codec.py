@@ -183,8 +183,7 @@ class PlanCodec:
     ) -> Self:
         """Rebuild a codec from its `settings` and arrays.
 
-        Raises:
-            KeyError, TypeError: Something is missing.
+        KeyError or TypeError if something is missing.
         """
         known = {name: _as_tuples(settings[name]) for name in _SETTINGS}
         return cls(**known, plan_range=plan_range, code_range=code_range)

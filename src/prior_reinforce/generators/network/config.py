@@ -40,8 +40,7 @@ class UNetSize(Checked):
     def __post_init__(self) -> None:
         """Check the sizes.
 
-        Raises:
-            ConfigurationError: One is outside its range, or they do not fit together.
+        ConfigurationError if one is outside its range, or they do not fit together.
         """
         super().__post_init__()
         if not self.widths or any(width % self.groups for width in self.widths):
@@ -165,11 +164,7 @@ class DiffusionConfig(UNetConfig):
     """Upper bound of that decay."""
 
     def __post_init__(self) -> None:
-        """Check the settings.
-
-        Raises:
-            ConfigurationError: One is outside its range.
-        """
+        """Check the settings; ConfigurationError if one is outside its range."""
         super().__post_init__()
         if self.sampling_steps > self.noise_levels:
             raise ConfigurationError(

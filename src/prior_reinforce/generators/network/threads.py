@@ -25,11 +25,8 @@ def torch_threads(n: int) -> Iterator[None]:
     """Let torch compute on n threads inside the block.
 
     The number is part of a result's last digits: sums are split among threads. So it is set rather
-    than inherited from whoever calls.
-
-    Raises:
-        ConfigurationError: More than one thread, and torch was loaded before they could be told to
-            sleep.
+    than inherited from whoever calls. ConfigurationError if there is more than one thread, and
+    torch was loaded before they could be told to sleep.
     """
     if n > 1 and _SPIN:
         raise ConfigurationError(

@@ -142,8 +142,7 @@ class _Run:
     def restored(self, path: Path, n_steps: int) -> tuple[int, float]:
         """Take up what was written: steps done and the mean loss; 0 if nothing was.
 
-        Raises:
-            FileFormatError: It is damaged, or of another training.
+        FileFormatError if it is damaged, or of another training.
         """
         from safetensors import SafetensorError
         from safetensors.torch import load

@@ -48,8 +48,7 @@ class Timed(Wrapper):
     def __init__(self, generator: Generator, timing: Timing = "auto") -> None:
         """Wrap a generator; the module tells what each timing is.
 
-        Raises:
-            ConfigurationError: There is no such timing, or the generator is timed already.
+        ConfigurationError if there is no such timing, or the generator is timed already.
         """
         if timing not in get_args(Timing):
             raise ConfigurationError(f"timing must be one of {get_args(Timing)}, got {timing!r}")

@@ -186,11 +186,7 @@ def declare_symmetry(
 
 
 def _centre(about: object) -> tuple[float, float]:
-    """The place that a motion is turned about, [m].
-
-    Raises:
-        ConfigurationError: It is none.
-    """
+    """The place that a motion is turned about, [m]; ConfigurationError if it is none."""
     if about == "base":
         return 0.0, 0.0
     place = np.empty(0)
@@ -285,8 +281,7 @@ def _refuse_unplayable(form: PlanFormat, distance: Distance, steps: Sequence[str
 def _first_joint(chain: Chain) -> tuple[float, tuple[float, float]]:
     """Which way the first joint counts, 1 or -1, and where its axis stands.
 
-    Raises:
-        ConfigurationError: It is not vertical.
+    ConfigurationError if it is not vertical.
     """
     along, (x, y) = first_axis(chain)
     lean = leaning(along)

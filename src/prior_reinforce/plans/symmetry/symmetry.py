@@ -87,11 +87,7 @@ class Symmetry:
     """Another one, which a session takes up where outcomes do not follow this one."""
 
     def __post_init__(self) -> None:
-        """Copy and check.
-
-        Raises:
-            ConfigurationError: Sizes that do not fit k, the number of moves.
-        """
+        """Copy and check; ConfigurationError for sizes that do not fit k, the number of moves."""
         k = len(self.moves)
         object.__setattr__(self, "moves", tuple(self.moves))
         for name, shape in _SHAPES.items():
