@@ -155,18 +155,10 @@ def as_vector(
     size: str,
     remedy: str,
 ) -> Point:
-    """Return one vector as a fresh float array.
+    """Return a vector (length,) as a fresh float array, or raise `problem`.
 
-    Args:
-        values: Shape (length,).
-        length: Components that are expected.
-        problem: Error to raise.
-        name: What to call the vector in a message.
-        size: Why it has this length, as a clause.
-        remedy: What to do about a vector that is not finite.
-
-    Raises:
-        InvalidGoalError, InvalidFeedbackError: As `problem` says: wrong shape, or not finite.
+    Its message calls the vector `name`; `size` is a clause that says why it has this length, and
+    `remedy` what to do about numbers that are not finite.
     """
     vector = _as_numbers(values, problem, f"{name} must be {length} numbers")
     if vector.shape != (length,):

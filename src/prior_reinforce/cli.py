@@ -65,27 +65,17 @@ since what the command still had to do was not done."""
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run one command.
-
-    Args:
-        args: The command line without the program's name; None takes the process's own.
-
-    Returns:
-        The exit status; see `run`.
-    """
+    """Run one command; its exit status, see `run`."""
     return run(_parse, args)
 
 
 def run(parse: Callable[[list[str]], Command | None], args: Sequence[str] | None = None) -> int:
     """Run a program of commands: parse a line, call once, say what went wrong.
 
-    Args:
-        parse: Makes the command that was called; None where there is nothing more to do.
-        args: The command line without the program's name; None takes the process's own.
-
-    Returns:
-        The exit status: 0 done, 1 not all of it, 2 wrong input and nothing changed, 130
-        interrupted, 141 nobody read on.
+    `args` are the command line without the program's name, the process's own if None. What `parse`
+    makes of them is called; None where there is nothing more to do. The exit status is 0 if done, 1
+    if not all of it, 2 for wrong input by which nothing changed, 130 if interrupted, 141 if nobody
+    read on.
     """
     warnings.showwarning = warn
     _open_streams()
@@ -149,15 +139,9 @@ def _parse(args: list[str]) -> Command | None:
 
 
 def read(kind: type[AnyCommand], program: str, args: list[str]) -> AnyCommand:
-    """Make one command of its options.
+    """Make one command of what was typed after the program's name, which help and messages say.
 
-    Args:
-        kind: Its class.
-        program: What it is called by, for help and messages.
-        args: What was typed after that.
-
-    Raises:
-        ConfigurationError: An option that it does not have, or a value that cannot be.
+    ConfigurationError for an option that it does not have, or a value that cannot be.
     """
     import tyro
 

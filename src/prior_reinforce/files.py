@@ -74,14 +74,9 @@ def sha256_of_folder(folder: Path) -> str:
 def open_npz(path: Path, remedy: str, largest: int | None = None) -> Iterator[np.lib.npyio.NpzFile]:
     """Open arrays that numpy saved, as data: no pickle is read, and no flood unpacked.
 
-    Args:
-        path: The file.
-        remedy: What to do about a file that is none, for the message.
-        largest: Bytes that it may unpack to; None takes those of an hour of any arm, and more.
-
-    Raises:
-        FileFormatError: Reading it fails, in the block as well: what can go wrong in damaged or
-            crafted bytes are a dozen kinds of errors of zipfile, zlib and numpy.
+    It may unpack to the `largest` number of bytes; None takes those of an hour of any arm, and
+    more. FileFormatError, with the remedy, if reading it fails, in the block as well: what can go
+    wrong in damaged or crafted bytes are a dozen kinds of errors of zipfile, zlib and numpy.
     """
     try:
         with path.open("rb") as file, zipfile.ZipFile(file) as packed:
@@ -129,11 +124,9 @@ def without_advice(error: BaseException) -> str:
 def in_place(path: Path) -> Iterator[Path]:
     """Give a place to write a file or a folder to, and move it to `path` when it is complete.
 
-    A file that stands there is replaced. A folder that stands there stays: another process was
-    quicker, and who writes folders here names them by what is in them.
-
-    Args:
-        path: Where it shall stand; the folder around it is made if need be.
+    The folder around it is made if need be. A file that stands there is replaced. A folder that
+    stands there stays: another process was quicker, and who writes folders here names them by what
+    is in them.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     with _unfinished(path) as unfinished:
@@ -149,29 +142,18 @@ def in_place(path: Path) -> Iterator[Path]:
 
 
 def write(path: Path, content: str | bytes) -> Path:
-    """Put a text (UTF-8) or bytes in place, whole or not at all; a file that is there is replaced.
-
-    Returns:
-        The path.
-    """
+    """Put a text (UTF-8) or bytes in place, whole; return the path. A file there is replaced."""
     with in_place(path) as unfinished:
         unfinished.write_bytes(content.encode() if isinstance(content, str) else content)
     return path
 
 
 def write_once(path: Path, content: bytes) -> Path:
-    """Put bytes in place as a read-only file that is never replaced.
+    """Put bytes in place as a read-only file that is never replaced, and return its path.
 
-    Args:
-        path: An existing file with the same content is kept; the folder around it must exist.
-        content: Of the file.
-
-    Returns:
-        The path.
-
-    Raises:
-        FileFormatError: Another file is there already.
-        WorkspaceError: The disk is full or the folder read-only; nothing is left behind.
+    An existing file with the same content is kept; the folder around it must exist. FileFormatError
+    if another file is there already; WorkspaceError if the disk is full or the folder read-only:
+    nothing is left behind.
     """
     with named_disk_errors(path.parent), _unfinished(path) as unfinished:
         unfinished.write_bytes(content)
@@ -210,15 +192,7 @@ def named_disk_errors(folder: Path) -> Iterator[None]:
 
 
 def refuse_foreign(path: Path, mark: str) -> None:
-    """Do nothing unless a file is there that this program did not write.
-
-    Args:
-        path: Where a file is to be written.
-        mark: Stands early in every such file of ours.
-
-    Raises:
-        FileFormatError: A file without the mark is there.
-    """
+    """Refuse to replace a file that lacks the mark which all of ours bear: FileFormatError."""
     if path.is_symlink() or path.exists():
         try:
             with path.open("rb") as file:

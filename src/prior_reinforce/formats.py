@@ -147,11 +147,8 @@ def in_tolerances(error: ArrayLike, tolerance: ArrayLike) -> float:
     """Return how far an error is from the goal, in tolerances: a hit is at most 1.
 
     The length of the error, each component divided by its tolerance (ours: the one way in which
-    metres and seconds add up, and the paper's distance where all tolerances are one number).
-
-    Args:
-        error: Outcome minus goal, shape (k,), in the outcomes' units.
-        tolerance: epsilon, shape (k,), or one number for all.
+    metres and seconds add up, and the paper's distance where all tolerances are one number). Both
+    are of shape (k,), or the tolerance is one number for all.
     """
     return float(np.linalg.norm(np.asarray(error) / np.asarray(tolerance)))
 
@@ -166,16 +163,9 @@ def as_bare_error(
 ) -> Point:
     """Return outcome minus goal in the outcome's units, which nobody stated, as a fresh array.
 
-    Args:
-        told: The error; or, if `landed`, the outcome.
-        goal: g, shape (k,).
-        form: What the outcomes are.
-        landed: Whether the outcome was asked for, not the error.
-        expected: How large an error may well be, (k,); such a one is not doubted.
-
-    Raises:
-        InvalidFeedbackError: Wrong shape, not finite, of another unit by its size, or an outcome in
-            place of an error, or the other way round.
+    `told` is the error; or, if `landed`, the outcome was asked for. An error as large as
+    `expected`, (k,), is not doubted. InvalidFeedbackError for a wrong shape, what is not finite,
+    another unit by its size, or an outcome in place of an error, or the other way round.
     """
     array = as_error(told, form.outcome_dim)
     error, other = (array - goal, array) if landed else (array, array - goal)

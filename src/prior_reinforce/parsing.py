@@ -199,14 +199,8 @@ def as_reading(
 def as_place(place: ArrayLike | str, form: OutcomeFormat, shown: ArrayLike = 0.0) -> Point:
     """Return a goal as numbers in the outcome's units: it is given as such, or said (`read_place`).
 
-    Args:
-        place: The goal, shape (k,), or in words.
-        form: What the outcomes are.
-        shown: Outcomes that are known, (N, k); numbers up to twice as large are in their units.
-
-    Raises:
-        InvalidGoalError: It cannot be read, has another shape, is not finite, or of another unit by
-            its size.
+    Numbers up to twice as large as `shown` outcomes, (N, k), are in their units. InvalidGoalError
+    if it cannot be read, has another shape, is not finite, or of another unit by its size.
     """
     if isinstance(place, str):
         try:

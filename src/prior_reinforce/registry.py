@@ -48,12 +48,9 @@ class Registry(Generic[T]):
     """All members of one family."""
 
     def __init__(self, family: str, base: str, members: Mapping[str, Member]) -> None:
-        """Name a family.
+        """Name a family: what a member is called in messages, its base `module:Class`, its members.
 
-        Args:
-            family: What a member is called, for messages: `adapter`.
-            base: `module:Class` that every member derives from.
-            members: By name, in the order of help texts.
+        They are by name, in the order of help texts.
         """
         self.family = family
         self.members = dict(members)
@@ -202,13 +199,9 @@ def parse_choice(choice: str) -> tuple[str, dict[str, str]]:
 def build(config: type[Any], settings: Mapping[str, Any], choice: str = "") -> Any:
     """Make a dataclass of settings from plain values: numbers as text, lists for tuples.
 
-    Args:
-        config: Frozen dataclass whose fields all have defaults.
-        settings: By name; a field that is a dataclass takes a mapping.
-        choice: What was asked for, for messages.
-
-    Raises:
-        ConfigurationError: An unknown setting, or a value of a wrong type or out of range.
+    All fields of `config` have defaults; one that is a dataclass takes a mapping. `choice` is what
+    was asked for, for messages. ConfigurationError for an unknown setting, or a value of a wrong
+    type or out of range.
     """
     import msgspec
 

@@ -207,9 +207,7 @@ def spoken(unit: str) -> tuple[str, float]:
 def in_unit(quantities: Mapping[Kind, float], unit: str) -> float | None:
     """Return the quantity of a unit's kind, in that unit; None if there is none for it.
 
-    Args:
-        quantities: In base units, by kind: `{"angle": 0.3}`.
-        unit: For instance `deg`.
+    Quantities are in base units, by kind: `{"angle": 0.3}`.
     """
     known = UNITS.get(unit)
     quantity = None if known is None else quantities.get(known.kind)
@@ -219,11 +217,8 @@ def in_unit(quantities: Mapping[Kind, float], unit: str) -> float | None:
 def looks_like(unit: str, number: float, *, error: bool = False, stated: bool = False) -> str:
     """Return the unit that a number in [m] or [rad] is in by its size; empty if it is plausible.
 
-    Args:
-        unit: The unit that it would be in; numbers in others than m and rad are all plausible.
-        number: The number.
-        error: Whether it is an error or a tolerance, not a place or a joint's angle.
-        stated: Whether a person said that this is its unit.
+    Numbers in other units are all plausible. `error` is of an error or a tolerance, not a place or
+    a joint's angle; `stated` of a unit that a person said.
     """
     known = UNITS.get(unit)
     if known is None or not known.spoken or known.kind == "time":

@@ -105,15 +105,9 @@ def trials_by_goal(results: Sequence[GoalTrials]) -> str:
 def asking(
     console: Console, demonstrations: Demonstrations, perception: Perception
 ) -> FailedReading:
-    """Fallback where perception fails: the person at the terminal.
+    """Return what asks the person at the terminal where perception fails, with its latest picture.
 
-    Args:
-        console: Where to ask.
-        demonstrations: What an outcome is called.
-        perception: Whose latest picture to show, if it has one.
-
-    Returns:
-        Asks for the error; a PerceptionFailedError where there is no terminal or no answer.
+    PerceptionFailedError where there is no terminal, or no answer.
     """
     form = demonstrations.outcome_format
 

@@ -36,21 +36,11 @@ _SKIP, _BACK = ("skip", "s"), ("back", "b")
 def ask_for_outcomes(
     folder: Path, source: Path, known: Outcomes, selection: Selection, form: OutcomeFormat
 ) -> Outcomes | None:
-    """Prompt for the outcomes that no table has.
+    """Prompt for the outcomes that no table has; answers are kept in the folder of the workspace.
 
-    Args:
-        folder: The workspace, where answers are kept.
-        source: The source of the recordings.
-        known: Outcomes of a table, in the units of `form`.
-        selection: The episodes in question.
-        form: What an outcome is.
-
-    Returns:
-        All outcomes known now, without skipped episodes; None if nothing was missing.
-
-    Raises:
-        InvalidDemonstrationsError: The input ended; the answers so far are kept.
-        WorkspaceError: The disk is full, or the folder read-only.
+    Returns all outcomes known now, in the units of `form`, without skipped episodes; None if
+    nothing was missing. InvalidDemonstrationsError if the input ended: the answers so far are kept;
+    WorkspaceError if the disk is full, or the folder read-only.
     """
     outcomes = places_of(selection.episodes, known)
     missing = [episode for episode in selection.episodes if episode not in outcomes]

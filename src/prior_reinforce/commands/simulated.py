@@ -157,13 +157,9 @@ class Adapt(_Reaching, OnTask):
     def reach(
         self, task: Task, demonstrations: Demonstrations, goals: Points, *, perceive: bool = False
     ) -> Reached:
-        """Learn, and work through goals in one session.
+        """Learn, and work through goals in one session, in [m].
 
-        Args:
-            task: Where they are tried.
-            demonstrations: D_prior.
-            goals: Each is worked through in turn, [m].
-            perceive: Whether the demonstrations are executed first, for their outcomes to be seen.
+        With `perceive` the demonstrations are executed first, for their outcomes to be seen.
         """
         console = Console()
         # Made first, so that a wrong setting is reported before anything is learned.

@@ -48,12 +48,9 @@ class Equivariant(Wrapper):
     """Exact components to which plans are brought, the others 0, shape (k,)."""
 
     def __init__(self, generator: Generator, *, finds: bool = False) -> None:
-        """Wrap a generator; see `Wrapper`.
+        """Wrap a generator of canonical plans; see `Wrapper`.
 
-        Args:
-            generator: Of canonical plans.
-            finds: Whether a turn is looked for where no symmetry is declared
-                (`plans.symmetry.found`).
+        With `finds`, a turn is looked for where no symmetry is declared (`plans.symmetry.found`).
         """
         super().__init__(generator)
         self._finds = finds
@@ -208,11 +205,9 @@ def _say_found(symmetry: Symmetry, names: Sequence[str]) -> str:
 
 
 def rested(plans: Sequence[Float[np.ndarray, "_ D"]], increments: Sequence[int] = ()) -> Plans:
-    """Stack plans of different lengths: shorter ones rest at their last frame.
+    """Stack plans (H_i, D) of different lengths: shorter ones rest at their last frame.
 
-    Args:
-        plans: At least one, shapes (H_i, D).
-        increments: Columns that are differences from frame to frame, 0 at rest.
+    `increments` are columns of differences from frame to frame, which are 0 at rest.
     """
     longest = max(map(len, plans))
     padded = []

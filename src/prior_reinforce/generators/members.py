@@ -52,17 +52,11 @@ class GeneratorRegistry(Registry["Generator"]):
     def _make(
         self, name: str, settings: Mapping[str, Any], context: Mapping[str, Any], choice: str
     ) -> Generator:
-        """Make a generator, wrapped as its settings say.
+        """Make a generator, wrapped as its settings `timing` and `symmetry` say.
 
-        Args:
-            name: Of the member.
-            settings: Its own, `timing` and `symmetry`.
-            context: `device`, `threads` and `states`, for those that take them.
-            choice: For messages.
-
-        Raises:
-            ConfigurationError: Also where there is no such `symmetry`, or another device is asked
-                for than the generator computes on.
+        The context is `device`, `threads` and `states`, for those that take them.
+        ConfigurationError also where there is no such `symmetry`, or another device is asked for
+        than the generator computes on.
         """
         from prior_reinforce.generators.equivariant import Equivariant
         from prior_reinforce.generators.timing.timed import Timed

@@ -52,11 +52,7 @@ _Motions = Float[np.ndarray, "N F"]
 
 
 def patterns(demonstrations: Demonstrations) -> tuple[tuple[int, ...], ...]:
-    """Sort demonstrations into patterns that do not mix, the largest first.
-
-    Returns:
-        Numbers of the demonstrations of each pattern; mostly one pattern of all.
-    """
+    """Sort demonstrations into patterns that do not mix, by their numbers, the largest first."""
     everything = tuple(range(demonstrations.n))
     try:
         decomposition = decompose(demonstrations, "start")

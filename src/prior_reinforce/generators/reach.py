@@ -32,13 +32,7 @@ _HALVINGS = 8
 
 
 def refusal(generator: Generator, goal: ArrayLike, check: Check) -> str:
-    """Return why a goal cannot be reached, in one sentence; empty where it can.
-
-    Args:
-        generator: Fitted.
-        goal: Shape (k,), in the outcomes' units.
-        check: Of the plan that is made for it.
-    """
+    """Return why a goal cannot be reached by a fitted generator's plan; empty where it can."""
     try:
         place = np.asarray(goal, dtype=np.float64)
         (plan,) = generator.generate(place[None])
@@ -78,12 +72,7 @@ def farthest_between(
 ) -> Point:
     """Return the last goal that can be reached on the way from one that can to one that cannot.
 
-    Args:
-        generator: Fitted.
-        within: That can be reached.
-        wanted: That cannot.
-        check: Of a goal's plan.
-        said: A goal as it is said, rounded: what is said is what can be reached.
+    It is `said` as a goal is, rounded: what is said is what can be reached.
     """
     low, high, last = 0.0, 1.0, within
     for _ in range(_HALVINGS):
@@ -106,9 +95,6 @@ def goals_around(demonstrations: Demonstrations) -> Float[np.ndarray, "rows colu
     """Return goals as far as a symmetry is believed: a ring about an axis, or a box.
 
     Components after the second stay in the middle of what was shown.
-
-    Args:
-        demonstrations: With a symmetry.
     """
     assert demonstrations.symmetry is not None
     chart = demonstrations.symmetry.chart
@@ -129,12 +115,6 @@ def goals_around(demonstrations: Demonstrations) -> Float[np.ndarray, "rows colu
 
 
 def reach(generator: Generator, goals: Float[np.ndarray, "rows columns k"], check: Check) -> Reach:
-    """Try goals, for instance those of `goals_around`.
-
-    Args:
-        generator: Fitted.
-        goals: What to try.
-        check: Of each goal's plan.
-    """
+    """Try goals, such as those of `goals_around`, by the check of a fitted generator's plans."""
     reached = [[not refusal(generator, goal, check) for goal in row] for row in goals]
     return Reach(goals, np.array(reached))

@@ -68,13 +68,9 @@ def write_model(folder: Path, layers: Sequence[SavedLayer]) -> None:
 
 
 def read_model(folder: Path) -> list[SavedLayer]:
-    """Read what `write_model` wrote.
+    """Read the layers that `write_model` wrote, at least one, the outermost first.
 
-    Returns:
-        At least one layer, the outermost first.
-
-    Raises:
-        FileFormatError: Files are missing, truncated or damaged.
+    FileFormatError if files are missing, truncated or damaged.
     """
     from safetensors import SafetensorError
     from safetensors.numpy import load

@@ -22,10 +22,8 @@ class BoundedClient(openai.DefaultHttpxClient):
     def __init__(self, seconds: float, most_bytes: int, **settings: Any) -> None:
         """Connect to nothing yet.
 
-        Args:
-            seconds: From the request to the end of its answer.
-            most_bytes: Of an answer, unpacked.
-            settings: Of `httpx.Client`.
+        An answer may take so many seconds from its request to its end, and have `most_bytes`
+        unpacked; `settings` are of `httpx.Client`.
         """
         super().__init__(**settings)
         self._seconds, self._most = seconds, most_bytes

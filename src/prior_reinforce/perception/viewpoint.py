@@ -73,13 +73,9 @@ def camera_costs(
 ) -> float:
     """Return by how much places of a parallel plane are off, at least, if the camera hangs there.
 
-    Against where the perspective puts it, in [m], where the points are; 0 where a camera there sees
-    them within what a click is off, or nothing is known.
-
-    Args:
-        calibration: Of the points' own plane.
-        height: Height of the other plane above the table, in [m].
-        camera: Where it is said to hang, table frame, in [m].
+    Against where the perspective of the points' own plane puts it, in [m], where the points are; 0
+    where a camera there sees them within what a click is off, or nothing is known. `height` of the
+    other plane above the table and the camera's place are in [m].
     """
     if not np.isfinite(camera).all() or miss_from(calibration, camera) <= _SLACK:
         return 0.0

@@ -91,19 +91,12 @@ def size_to_send(width: int, height: int, most_side: int, box_format: BoxFormat)
 
 
 def read_box(answer: str, box_format: BoxFormat, size: tuple[int, int]) -> Box:
-    """Read the one box of an answer.
+    """Read the one box of an answer, in pixels of the picture of `size` that was sent.
 
     Thinking text is skipped; of several boxes the last marked one counts, else the last one in the
-    text, as models restate and correct themselves. Swapped corners are put right.
-
-    Args:
-        answer: What the model said, drafts, markers and all.
-        box_format: Of the model.
-        size: Width and height of the picture it was sent, in [px]; the box is in its pixels.
-
-    Raises:
-        NotInPictureError: The answer is an empty list.
-        UnreadableAnswerError: No box, several at once, or one that cannot be in the picture.
+    text, as models restate and correct themselves. Swapped corners are put right. NotInPictureError
+    if the answer is an empty list; UnreadableAnswerError for no box, several at once, or one that
+    cannot be in the picture.
     """
     thoughts = [*_THOUGHTS.finditer(answer)]
     if thoughts and not thoughts[-1]["ends"]:

@@ -53,14 +53,9 @@ def minimum_jerk(part: Float[np.ndarray, "*s"]) -> Float[np.ndarray, "*s"]:
 
 
 def join_frames(frames: ArrayLike, dt: float) -> CubicSpline:
-    """The spline through the frames, at rest at both ends, over [0, (H - 1) dt].
+    """The spline through frames (H, D), dt [s] apart, at rest at both ends, over [0, (H - 1) dt].
 
-    Args:
-        frames: Shape (H, D), H >= 2.
-        dt: Time between two frames, in [s].
-
-    Raises:
-        InvalidPlanError: Another shape, values that are not finite, or a dt that is not positive.
+    InvalidPlanError for another shape, values that are not finite, or a dt that is not positive.
     """
     from scipy.interpolate import CubicSpline
 

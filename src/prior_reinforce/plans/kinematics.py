@@ -56,9 +56,8 @@ class Chain:
     def craig(cls, rows: Sequence[tuple[float, float, float]], flange: float) -> Chain:
         """Make one from rows (a, d, alpha): Rot_x(alpha) Trans_x(a) Rot_z(theta) Trans_z(d).
 
-        Args:
-            rows: a and d in [m], alpha in [rad].
-            flange: Distance from the last joint's frame to the flange along its z axis, in [m].
+        They are in [m] and [rad]; the flange is so far from the last joint's frame along its z
+        axis.
         """
         origins = tuple(
             (a, -math.sin(alpha) * d, math.cos(alpha) * d, alpha, 0.0, 0.0) for a, d, alpha in rows
@@ -69,9 +68,8 @@ class Chain:
     def standard(cls, rows: Sequence[tuple[float, float, float]], yaw: float = 0.0) -> Chain:
         """Make one from rows (a, d, alpha): Rot_z(theta) Trans_z(d) Trans_x(a) Rot_x(alpha).
 
-        Args:
-            rows: a and d in [m], alpha in [rad].
-            yaw: By which the maker's base frame is turned in the one that is wanted, in [rad].
+        They are in [m] and [rad]; the maker's base frame is turned by `yaw` in the one that is
+        wanted.
         """
         poses = tuple((a, 0.0, d, alpha, 0.0, 0.0) for a, d, alpha in rows)
         base = (0.0, 0.0, 0.0, 0.0, 0.0, yaw)
@@ -167,18 +165,10 @@ def turned_path(
 ) -> JointPositions:
     """Turn the flange's path about a vertical axis and solve for the joints, all frames at once.
 
-    Damped Newton steps of least norm from the path that was given, turned a little at a time: so a
-    smooth path stays smooth, and elbows stay where they were. Joints that the path holds stay held
-    as long as six others move.
-
-    Args:
-        chain: The arm.
-        joints: Shape (H, D), [rad].
-        angle: [rad].
-        centre: (x, y) of the axis in the base frame, [m].
-
-    Raises:
-        OutOfReachError: A pose of the turned path cannot be reached.
+    Damped Newton steps of least norm from the path (H, D) that was given, turned a little at a
+    time: so a smooth path stays smooth, and elbows stay where they were. Joints that the path holds
+    stay held as long as six others move. The axis is at `centre`, (x, y) in the base frame; angles
+    are in [rad]. OutOfReachError if a pose of the turned path cannot be reached.
     """
     given, about, q = flange_path(chain, joints), np.array([*centre, 0.0]), np.array(joints)
     free = np.ptp(joints, axis=0) > _HELD

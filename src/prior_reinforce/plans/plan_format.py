@@ -108,12 +108,9 @@ def summed(
 ) -> Float[np.ndarray, "*N T+1 D"]:
     """Return the poses of a motion of increments: before each frame, from 0 on, and after the last.
 
-    Between poses a motion can be sampled anew. Other columns stay beside the pose at which they
-    are commanded, and hold their last value.
-
-    Args:
-        frames: Shape (..., T, D).
-        increments: Columns (`PlanFormat.increments`).
+    Between poses a motion can be sampled anew. Other columns stay beside the pose at which they are
+    commanded, and hold their last value. Frames are of shape (..., T, D), `increments` those
+    columns (`PlanFormat.increments`).
     """
     poses, columns = np.concatenate([frames, frames[..., -1:, :]], axis=-2), list(increments)
     poses[..., 0, columns] = 0.0

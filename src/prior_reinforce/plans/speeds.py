@@ -50,12 +50,9 @@ def velocity_profiles(
 ) -> list[Motion]:
     """Return smoothed velocities, scaled so that the channels of every unit count alike.
 
+    Central differences, smoothed by a Gaussian of standard deviation `smoothing`, in frames.
     Channels of one unit share one scale, their pooled root mean square over all motions: a joint
     that only jitters stays small beside one that throws. A unit in which nothing moves gives zeros.
-
-    Returns:
-        Of each motion, central differences, smoothed by a Gaussian of standard deviation
-        `smoothing`, in frames, and scaled: pure numbers.
     """
     from scipy.ndimage import gaussian_filter1d
 

@@ -32,21 +32,11 @@ def draw_advice(
     throw: Point | None = None,
     demonstration: Point | None = None,
 ) -> Path:
-    """Draw it.
+    """Draw it as a PNG, and return the path; what cannot be reached is hatched.
 
-    Args:
-        path: PNG.
-        form: What the two components are.
-        demonstrated: Outcomes of the demonstrations.
-        reached: Which goals can be reached; what cannot is hatched.
-        goals: A grid, shape (n, 2), the second component fastest; None shows what is reached.
-        p_hit: Probability that a first throw hits each; None without goals.
-        goal: That is set; None before one is.
-        throw: Goal of the throw that teaches most; None if none does.
-        demonstration: Where the demonstration that teaches most ends; None if none would teach.
-
-    Returns:
-        The path.
+    `goals` are a grid (n, 2), the second component fastest, with the probability that a first throw
+    hits each; None shows what is reached. `throw` and `demonstration` are the goals of those that
+    teach most; None if none does.
     """
     scale, units = drawn_scale(form), form.units
     demonstrated = scale * demonstrated

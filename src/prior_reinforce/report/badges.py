@@ -32,13 +32,8 @@ def draw_badges(
 ) -> None:
     """Draw a label near each place; all places are in data coordinates.
 
-    Args:
-        axes: Of a figure that is laid out; its limits must not change afterwards.
-        places: What is labelled.
-        labels: One a place.
-        colours: One a place.
-        away_from: Where badges should not point to (the goal).
-        avoid: Other marks that badges should not cover.
+    The figure is laid out, and the limits of its axes must not change afterwards. Badges point
+    `away_from` a place (the goal), and cover none of the marks to `avoid`.
     """
     longest = max(map(len, labels), default=1)
     size = np.array([_HEIGHT + _LETTER * (longest - 1), _HEIGHT])

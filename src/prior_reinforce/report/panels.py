@@ -143,12 +143,9 @@ class Panel:
     ) -> None:
         """Draw where trials were seen to land, each with its error as an arrow from the goal.
 
-        Args:
-            record: The goal and its trials.
-            aims: Draw where they were aimed instead, each with an arrow from the aim before;
-                hollow where a trial was voided.
-            numbered: Number the trials; on a line, give each a row.
-            with_truth: Draw where they truly landed, too, as far as that is known.
+        With `aims`, where they were aimed instead, each with an arrow from the aim before, hollow
+        where a trial was voided; `numbered`, with their numbers, and on a line each in a row;
+        `with_truth`, also where they truly landed, as far as that is known.
         """
         places: list[_Place] = []
         true_places: list[_Place] = []

@@ -30,10 +30,7 @@ _NAMED = 12  # goals at most; the names of more would hide what they name
 def draw_table(records: Sequence[AdaptationRecord], region: Box | None = None) -> Figure:
     """Draw the whole table: demonstrations, goals, and what was seen of every trial.
 
-    Args:
-        records: Goals of one set of demonstrations. The trials of a single one are numbered; of
-            a few, the goals are named.
-        region: Region of goals, or None.
+    The trials of a single goal are numbered; of a few, the goals are named.
     """
     first, single = records[0], len(records) == 1
     legend = _legend(first)
@@ -94,14 +91,8 @@ def _panels(
 ) -> tuple[Figure, list[Panel]]:
     """Make a figure with one panel a view, laid out and ready to be drawn in.
 
-    Args:
-        record: Names and units of the components, and the demonstrations.
-        seen: All that must be seen.
-        margin: Share of its size that is left free on each side.
-        least: Least half size, in tolerances.
-        n_rows: Rows of a line.
-        legend: Marks by what they mean.
-        flat: Make the figure only as high as what is seen.
+    All that is `seen` is in it, with a margin that is a share of its size, and at least so many
+    tolerances; a line has `n_rows`. `flat` makes it only as high as that.
     """
     views = views_of(record.format)
     points = np.stack(seen) * record.scale

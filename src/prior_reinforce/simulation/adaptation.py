@@ -28,13 +28,7 @@ class RecordingPerception(Perception):
     """
 
     def __init__(self, perception: VisionLanguageModel, folder: Path, stem: str) -> None:
-        """Keep the readings of what comes one after another: a goal's trials, or demonstrations.
-
-        Args:
-            perception: Who looks.
-            folder: For the pictures; made when there is one.
-            stem: Of the files' names; a number from 1 follows.
-        """
+        """Keep readings of what comes one after another in a folder, called `stem` and a number."""
         self._perception = perception
         self._folder = folder
         self._stem = stem
@@ -72,15 +66,9 @@ def goal_record(
     film_in: Path | None,
     seed: int,
 ) -> AdaptationRecord:
-    """Return what the report tells of a goal, with a film of its last trial.
+    """Return what the report tells of a goal by its number, with a film of its last trial.
 
-    Args:
-        task: Where it was tried.
-        demonstrations: D_prior.
-        result: What came of it.
-        number: Of the goal, from 1.
-        film_in: Folder for the film; None draws none.
-        seed: What `reach_goals` executed the trials with.
+    It is in `film_in`, None draws none; `seed` is what `reach_goals` executed the trials with.
     """
     last, film, caption = result.trials[-1], None, "no film was asked for"
     if film_in is not None:

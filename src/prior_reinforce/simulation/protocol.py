@@ -64,10 +64,7 @@ class GoalTrials:
 def is_hit(rollout: Rollout, goal: Point, tolerance: ArrayLike) -> bool:
     """Whether the true outcome is within the tolerance of the goal; a lost object never is.
 
-    Args:
-        rollout: What came of an execution.
-        goal: g, shape (k,), in the outcomes' units.
-        tolerance: epsilon of the task, as sessions compare with it (`formats.in_tolerances`).
+    The tolerance is as sessions compare with it (`formats.in_tolerances`).
     """
     return bool(rollout.valid and in_tolerances(rollout.outcome - goal, tolerance) <= 1.0)
 

@@ -154,15 +154,10 @@ class Verbs:
     ) -> None:
         """Open the workspace.
 
-        Args:
-            folder: Of the workspace.
-            moved_by: The command or the arm that executes plans; None where nothing can.
-            time_limit: How long that may take, in [s].
-            report: Path at which the report is read.
-            publish: Called, in any thread, with what all tabs should hear.
-
-        Raises:
-            WorkspaceError, FileFormatError, ConfigurationError: See `Workspace`.
+        `moved_by` is the command or the arm that executes plans, None where nothing can,
+        `time_limit` how long that may take, in [s], `report` the path at which the report is read.
+        `publish` is called, in any thread, with what all tabs should hear. Errors as of
+        `Workspace`.
         """
         self.folder = folder
         self.workspace = Workspace(folder)

@@ -44,9 +44,7 @@ holds it; or a leader moves it at once."""
 def begin_at(plan: Plan, pose: Float[np.ndarray, " d"]) -> Plan:
     """The plan from where the arm stands: a motion of its own, to be checked as what is sent.
 
-    Args:
-        plan: In the arm's own columns.
-        pose: Where the arm stands, which the first frame is nearly.
+    The plan is in the arm's own columns, and the pose is nearly its first frame.
     """
     s = np.clip(plan.times / min(_BLEND, plan.times[-1]), 0, 1)[:, None]
     left = 1 - s**3 * (10 - 15 * s + 6 * s**2)

@@ -119,17 +119,11 @@ def execute_command(
 
 
 def ask_arm(command: str, arguments: tuple[str, ...], folder: Path, *, time_limit: float) -> None:
-    """Run a command that moves nothing, to its end.
+    """Run a command that moves nothing, to its end, within a time limit in [s].
 
-    Args:
-        command: What it is called in messages.
-        arguments: Its program and arguments.
-        folder: An empty folder for what watches over it.
-        time_limit: In [s].
-
-    Raises:
-        ConfigurationError: It cannot be started, fails, or takes too long.
-        KeyboardInterrupt: Interrupted, once all has ended.
+    `command` is what messages call it, `folder` is empty, for what watches over it.
+    ConfigurationError if it cannot be started, fails, or takes too long; KeyboardInterrupt once all
+    has ended.
     """
     with Interruptions() as noted:
         ended = supervise(arguments, folder, time_limit=time_limit, interruptions=noted)

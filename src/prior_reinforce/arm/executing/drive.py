@@ -196,16 +196,10 @@ def approach(
 def say_distance(
     off: Float[np.ndarray, " D"], form: PlanFormat, settings: GateSettings
 ) -> tuple[str, bool]:
-    """Hold the distances of a plan's columns from its first frame against what is allowed.
+    """Say what is off most in each unit from a plan's first frame, and whether all is near enough.
 
-    Args:
-        off: Of each column, in its unit.
-        form: Of the plan.
-        settings: How far it may be off (`errors_of`); a unit of which they say nothing is named,
-            and must not be off at all.
-
-    Returns:
-        What is off most in each unit, in words; and whether all is near enough.
+    `settings` allow so much (`errors_of`); a unit of which they say nothing is named, and must not
+    be off at all.
     """
     worst: dict[str, tuple[float, str]] = {}
     off = np.nan_to_num(off, nan=np.inf, posinf=np.inf)  # what is no number may be anywhere

@@ -58,17 +58,12 @@ class ExecutingLock:
 def executing_lock(
     folder: Path | None = None, arm: str = "", stop_seen: int | None = None
 ) -> Iterator[ExecutingLock]:
-    """Hold the right to move an arm, and to execute a trial of a workspace.
+    """Hold the right to move an arm, and, with the `folder` of a workspace, to execute its trial.
 
-    Args:
-        folder: The workspace's, if it is a workspace's trial.
-        arm: Name of the arm; without one, what PRIOR_REINFORCE_ARM says, or the one arm that all
-            without a name share.
-        stop_seen: `last_stop` of the workspace when the motion was asked for; now if not given.
-
-    Raises:
-        TrialStateError: Somebody else holds it, or something that was executed still runs.
-        WorkspaceError: The folder cannot be opened, or its file system has no locks.
+    Without a name, the arm is the one that PRIOR_REINFORCE_ARM names, or the one that all without a
+    name share. `stop_seen` is `last_stop` of when the motion was asked for; now if not given.
+    TrialStateError if somebody else holds it, or something that was executed still runs;
+    WorkspaceError if the folder cannot be opened, or its file system has no locks.
     """
     deadline = time.monotonic() + _WAIT_S
     name = _name_of_arm(arm)

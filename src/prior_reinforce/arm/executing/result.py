@@ -100,18 +100,10 @@ def by_unit(distance: dict[str, float] | float) -> dict[str, float]:
 
 
 def measure_tracking(folder: Path, plan: Plan) -> dict[str, dict[str, float]]:
-    """How far the measured path was from the plan.
+    """How far the measured path (`read_path`) was from the plan; empty where there is none.
 
-    Args:
-        folder: Where the driver may have put `executed.npz`; see `read_path`.
-        plan: What was to be executed.
-
-    Returns:
-        `start_error`, `tracking_rms`, `tracking_max` and `end_error` of `MotionResult`, each by
-        unit over the columns in it; empty where there is no such file.
-
-    Raises:
-        FileFormatError: It is no such file.
+    Returns `start_error`, `tracking_rms`, `tracking_max` and `end_error` of `MotionResult`, each by
+    unit over the columns in it.
     """
     path = read_path(folder, plan.format)
     if path is None:
@@ -133,11 +125,7 @@ def read_path(
 ) -> tuple[Float[np.ndarray, " T"], Float[np.ndarray, "T D"]] | None:
     """Read `executed.npz`: `t` in [s] from the motion's start, `q` in the plan's units.
 
-    Returns:
-        Both; None where there is no such file.
-
-    Raises:
-        FileFormatError: It is no such file.
+    None where there is none; FileFormatError if it is no such file.
     """
     path = folder / PATH_FILE
     if not path.is_file() or path.is_symlink():
@@ -153,14 +141,9 @@ def read_path(
 def lag_behind(
     t: Float[np.ndarray, " T"], goals: Float[np.ndarray, "T d"], measured: Float[np.ndarray, "T d"]
 ) -> float:
-    """How far a measured motion is behind what was asked for, in [s], to a millisecond.
+    """How far a measured motion is behind its goals at times `t`, in [s], to a millisecond.
 
     The shift of the goals in time, up to 0.3 s, that fits best (least squares).
-
-    Args:
-        t: When, in [s].
-        goals: What was asked for then.
-        measured: What was measured then, in the same units.
     """
 
     def misfit(shift: float) -> float:

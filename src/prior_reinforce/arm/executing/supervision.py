@@ -110,14 +110,9 @@ def supervise(
 ) -> Ended | None:
     """Run a command under the supervisor until all that it started has ended.
 
-    What is raised meanwhile, by `show` or a signal's handler, stops it and is in `interruptions`.
-
-    Returns:
-        What the supervisor wrote; None where it could not.
-
-    Raises:
-        ConfigurationError: The system starts nothing; nothing has run.
-        BaseException: What a signal's handler raised before anything has run.
+    Returns what the supervisor wrote; None where it could not. What is raised meanwhile, by `show`
+    or a signal's handler, stops it and is in `interruptions`. ConfigurationError if the system
+    starts nothing; what a signal's handler raises before anything has run is raised.
     """
     with ExitStack() as stack:
         try:

@@ -70,14 +70,10 @@ class Watch:
     """An arm that is being read by the program; use it in a `with` block."""
 
     def __init__(self, arm: ArmSettings, lock: ExecutingLock) -> None:
-        """Start the program, and wait until the arm has answered.
+        """Start the program, and wait until the arm has answered; ConfigurationError if it has not.
 
-        Args:
-            arm: Whose leader may move it.
-            lock: The right to, which the program holds too: it is stopped as any motion is.
-
-        Raises:
-            ConfigurationError: It has not.
+        The lock is the right to move it, as a leader may; the program holds it too, so that it is
+        stopped as any motion is.
         """
         self._process = subprocess.Popen(
             [*program(__name__), msgspec.json.encode(arm).decode()],

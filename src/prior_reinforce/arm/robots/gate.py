@@ -391,13 +391,9 @@ def _distance(plan: Plan, shown: Sequence[Plan], settings: GateSettings) -> Limi
 def beyond_band(plan: Plan, references: Sequence[Plan]) -> Samples:
     """How far each frame lies beyond a band of motions, as a share of each column's range there.
 
-    The band is between the lowest and the highest motion at the frame's time. Where one takes
-    longer or shorter than the plan, by more than a frame, it is between the lowest and the highest
-    frame of all.
-
-    Args:
-        plan: The motion to be judged.
-        references: Motions in the same columns, of any number of frames and time steps.
+    The band is between the lowest and the highest of the references at the frame's time. Where one
+    takes longer or shorter than the plan, by more than a frame, it is between the lowest and the
+    highest frame of all.
     """
     form = plan.format
     references = [

@@ -155,11 +155,8 @@ def other_quantities(format: PlanFormat, limits: RobotLimits) -> tuple[str, ...]
 def match_joints(format: PlanFormat, limits: RobotLimits) -> dict[int, int]:
     """Match a plan's columns to a robot's joints: by name (`is_joint`), never guessed.
 
-    Returns:
-        Column of the plan by index of the robot's joint, for the joints that have one, in order.
-
-    Raises:
-        InvalidPlanError: Two columns look like one joint, or a joint is in another unit than [rad].
+    Returns the column of each joint that has one, by the joint's index, in order. InvalidPlanError
+    if two columns look like one joint, or a joint is in another unit than [rad].
     """
     columns: dict[int, int] = {}
     of_joint = [joint_of(column, limits.joint_names) for column in format.names]

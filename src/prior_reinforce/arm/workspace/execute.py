@@ -176,8 +176,7 @@ def look_at_arm(workspace: Workspace, number: int, arm: ArmSettings, *, speed: f
 def recover(workspace: Workspace) -> Trial | None:
     """Note how an execution ended whose program was killed, where its supervisor wrote it down.
 
-    Returns:
-        The trial as it stands now; None where there is nothing to recover.
+    Returns the trial as it stands now; None where there is nothing to recover.
     """
     now = workspace.standing
     trial = now.state.open_trial
@@ -235,12 +234,7 @@ def ask_to_move(
 ) -> str:
     """What a person is asked before the arm moves: how it will, and what nobody checked.
 
-    Args:
-        workspace: The trial's.
-        trial: Whose plan it is.
-        look: What the arm said before; None where a command moves it.
-        motion: What it is to be moved for.
-        speed: Share of the plan's own speed, of a rehearsal.
+    `look` is what the arm said before; None where a command moves it.
     """
     plan, said = workspace.plan(trial), _MOTIONS[motion].format(trial.number, 100 * speed)
     gate, verdict = workspace.manifest.gate, workspace.gate(plan.actions, trial.condition)
@@ -315,11 +309,7 @@ def _record(
     motion: Motion = "trial",
     speed: float = 1.0,
 ) -> MotionResult:
-    """Record how a motion ended, with its tracking error where the driver measured its path.
-
-    Returns:
-        The result with that error.
-    """
+    """Record how a motion ended; the result, with its tracking error where a path was measured."""
     try:
         plan = workspace.plan(trial)
         slow = dataclasses.replace(plan.format, dt=plan.format.dt / speed)

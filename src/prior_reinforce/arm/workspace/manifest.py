@@ -111,9 +111,7 @@ class Manifest:
     def agrees(self, demonstrations: Demonstrations, *, in_range: bool = False) -> bool:
         """Whether demonstrations carry the symmetry that is declared, where one is.
 
-        Args:
-            demonstrations: That were imported.
-            in_range: Also the joints' ranges of now, which a person may narrow between trials.
+        With `in_range` also the joints' ranges of now, which a person may narrow between trials.
         """
         declared, carried = self.declared(demonstrations.format), demonstrations.symmetry
         if declared is None or carried is None:
@@ -196,12 +194,10 @@ _LENGTH_OF_AXIS = 1e-3
 
 
 def workspace_around(folder: Path, *, above: bool = True) -> Path | None:
-    """Return the workspace that a folder is, or is in; None where it is in none.
+    """Return the workspace that a folder is, or is in, relative to it; None where it is in none.
 
-    Args:
-        folder: For instance the current one, `Path()`; what is returned is relative to it.
-        above: Whether folders above it count, as far as they have the same owner: what somebody
-            else put into a shared folder is nobody's workspace.
+    Folders `above` it count as far as they have the same owner: what somebody else put into a
+    shared folder is nobody's workspace.
     """
     owner = folder.stat().st_uid if above else None
     for up in ("", *([".."] * len(folder.resolve().parts) if above else ())):

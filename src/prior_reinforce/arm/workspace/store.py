@@ -121,11 +121,8 @@ class Store:
     def save_plan(self, plan: Plan, number: int, named: Collection[str] = ()) -> PlanFile:
         """Keep a trial's plan.
 
-        Args:
-            plan: The plan.
-            number: The trial's.
-            named: Names of the plans that events name. Any other file is what a crash left before
-                its event, and is replaced.
+        `named` are the plans that events name: any other file is what a crash left before its
+        event, and is replaced.
         """
         path = self.path("plans", f"trial-{number:03d}-{sha256(plan.actions.tobytes())[:8]}.npz")
         with named_disk_errors(self._folder):

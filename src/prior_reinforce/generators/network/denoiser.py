@@ -41,13 +41,9 @@ def loss(
 ) -> Callable[[], torch.Tensor]:
     """Return what draws a batch and tells how far the network is off, mean square.
 
-    Args:
-        network: Of one member, or of several, each with a prediction of its own.
-        codes: x_0 of the demonstrations, on the network's device.
-        conditions: Scaled outcomes, on the same device.
-        config: Batch, noise levels and what is predicted.
-        rng: Source of noise and noise levels.
-        draw: What the samples of a batch are; the demonstrations themselves when None.
+    The network is of one member, or of several, each with a prediction of its own; `codes` are x_0
+    of the demonstrations and `conditions` scaled outcomes, both on its device. `draw` says what the
+    samples of a batch are; the demonstrations themselves when None.
     """
     schedule = NoiseSchedule.squared_cosine(config.noise_levels)
 
@@ -67,10 +63,9 @@ def loss(
 def draw_batch(
     n: int, config: DiffusionConfig, rng: torch.Generator
 ) -> tuple[Int[torch.Tensor, " B"], Int[torch.Tensor, " B"]]:
-    """Draw which demonstrations and which noise levels make a batch.
+    """Draw which of n demonstrations and which noise levels make a batch.
 
-    Returns:
-        Rows in 0 ... N-1, each as often as any other to within one, and levels.
+    Each demonstration comes as often as any other to within one.
     """
     size = config.batch_size if config.fill_batch else min(config.batch_size, n)
     passes = math.ceil(size / n)
@@ -92,15 +87,9 @@ def sample(
     seed: int,
     sampler: Callable[[Denoiser], torch.Tensor] | None = None,
 ) -> Float[torch.Tensor, "n C T"]:
-    """Return one code for each condition.
+    """Return one code (C, T) for each scaled condition, by a network trained with `config`.
 
-    Args:
-        network: Trained with the same config.
-        conditions: Scaled conditions, on the network's device.
-        shape: (C, T) of a code.
-        config: Sampler and its settings.
-        seed: Of the noise.
-        sampler: Instead of the one that the config names.
+    The `sampler` is that of the config, if none is given.
     """
     schedule = NoiseSchedule.squared_cosine(config.noise_levels)
     rows = [b""] if config.shared_noise else [row.tobytes() for row in conditions.cpu().numpy()]
@@ -141,9 +130,7 @@ class Denoiser:
     ) -> Float[torch.Tensor, "B C T"]:
         """The network's estimate of x_0, clipped to the range of what was learned and its margin.
 
-        Args:
-            noisy: Codes, a condition's copies one after another.
-            level: Of the noise in all of them.
+        All `noisy` codes, a condition's copies one after another, have the noise of one level.
         """
         conditions = self.conditions.repeat_interleave(len(noisy) // len(self.conditions), dim=0)
         levels = torch.full((len(noisy),), level, device=noisy.device)

@@ -63,8 +63,7 @@ def transitions(
 ) -> Float[np.ndarray, "N M"] | None:
     """Return when a `step` or `switch` changes: the middle of each transition, in frames.
 
-    Returns:
-        M times of each demonstration, in order; None where demonstrations differ in their number.
+    M times of each demonstration, in order; None where demonstrations differ in their number.
     """
     changes = np.abs(np.diff(values, axis=1))
     times = [

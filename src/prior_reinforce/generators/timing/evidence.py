@@ -130,8 +130,7 @@ def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
 def outcome_error(demonstrations: Demonstrations, decomposition: Decomposition) -> float:
     """Return how far left-out outcomes are missed, relative to their spread.
 
-    Returns:
-        Root mean square at the decisive phase; 1 is what the mean of the others would do.
+    The root mean square at the decisive phase; 1 is what the mean of the others would do.
     """
     states = _states(demonstrations, decomposition)
     outcomes = demonstrations.outcomes_seen / demonstrations.outcomes_seen.std(axis=0)

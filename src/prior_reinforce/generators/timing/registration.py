@@ -116,11 +116,8 @@ class Motions:
     def register(self, kind: WarpKind, some: Some = slice(None)) -> tuple[Warps, bool]:
         """Find the warp of each demonstration, or of some.
 
-        Returns:
-            theta, and whether the change of a channel that jumps is phase 0.
-
-        Raises:
-            InvalidDemonstrationsError: A demonstration does not move.
+        Returns theta, and whether the change of a channel that jumps is phase 0.
+        InvalidDemonstrationsError if a demonstration does not move.
         """
         if kind == "none":
             return np.zeros((len(self.profiles[some]), 0)), False
@@ -220,8 +217,7 @@ def _start_and_pace(warps: Warps) -> tuple[Float[np.ndarray, "N 1"], Float[np.nd
 def correlation_lags(profiles: Profiles) -> Float[np.ndarray, " N"]:
     """Find the lags that maximise the sum of all pairwise correlations.
 
-    Returns:
-        How many frames later each demonstration is to be moved, mean zero; all count alike.
+    Returns how many frames later each is to be moved, mean zero; all count alike.
     """
     spectra = _spectra(profiles)
     turns = 2j * np.pi * np.fft.rfftfreq(2 * profiles.shape[1])  # [rad/frame]

@@ -94,11 +94,9 @@ class Timeline:
         return [d for d in range(self.n_channels) if d not in own]
 
     def reconstruct(self, shapes: Shapes, numbers: Numbers) -> Plans:
-        """Make plans of shapes and warps.
+        """Make plans of shapes, as `decompose` gives them, and of warps.
 
-        Args:
-            shapes: From `decompose`, or like them.
-            numbers: theta of each; kept between `lowest` and `highest`.
+        theta of each is kept between `lowest` and `highest`.
         """
         plans = np.full((len(shapes), self.horizon, self.n_channels), np.nan)
         if not (np.all(np.isfinite(shapes)) and np.all(np.isfinite(numbers))):
@@ -185,18 +183,11 @@ class Decomposition:
 def decompose(
     demonstrations: Demonstrations, kind: WarpKind, some: tuple[int, ...] = ()
 ) -> Decomposition:
-    """Find the warp of each demonstration, and its shape on the common phase.
+    """Find the warp of each demonstration, or of `some`, and its shape on the common phase.
 
-    Args:
-        demonstrations: All of them tell noise, jumps and how channels are scaled.
-        kind: What warps may do.
-        some: Numbers of those that are decomposed; all if none is given.
-
-    Returns:
-        The decomposition; of kind `none` where what was asked for would lose part of the motion.
-
-    Raises:
-        InvalidDemonstrationsError: Nothing moves, so nothing can be timed.
+    All of them tell noise, jumps and how channels are scaled. The decomposition is of kind `none`
+    where what was asked for would lose part of the motion. InvalidDemonstrationsError if nothing
+    moves, so that nothing can be timed.
     """
     signals, horizon = demonstrations.signals, demonstrations.horizon
     units = demonstrations.format.units

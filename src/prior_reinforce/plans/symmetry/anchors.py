@@ -36,13 +36,7 @@ class Anchors:
     """
 
     def __init__(self, symmetry: Symmetry, outcomes: Points, noise: Points) -> None:
-        """Place demonstrations in the chart.
-
-        Args:
-            symmetry: Of the demonstrations.
-            outcomes: Shape (N, k).
-            noise: Standard deviation of each, shape (N, k).
-        """
+        """Place demonstrations in the chart, by outcomes and their standard deviations, (N, k)."""
         self.symmetry = symmetry
         self.z: Points = symmetry.chart.to(outcomes)
         """Demonstrated outcomes in the chart, (N, k)."""
@@ -58,13 +52,9 @@ class Anchors:
             self._weights = smooth_weights(self.z[:, left], noise=self.sd[:, left])
 
     def base(self, aims: Points) -> tuple[Points, Float[np.ndarray, "n N"]]:
-        """Return where plans for aims are moved from, and how much each demonstration counts there.
+        """Return where plans for aims z (n, k) are moved from, and how much each one shown counts.
 
-        Args:
-            aims: z, shape (n, k).
-
-        Returns:
-            z_base (n, k), and weights (n, N) that sum to one.
+        These are z_base (n, k), and weights (n, N) that sum to one.
         """
         if not self.mixed:
             weights = self._picked(aims)
@@ -80,16 +70,11 @@ class Anchors:
         return base, weights
 
     def moves(self, aim: Point) -> tuple[Points, Point]:
-        """Return by how much each demonstration is moved where a plan for an aim is made of it.
+        """Return how far demonstrations are moved where a plan for an aim z (k,) is made of them.
 
-        Exact components are brought to the aim, the others moved as far as the plan is. A
-        demonstration that such a plan is not made of is at infinity.
-
-        Args:
-            aim: z, shape (k,).
-
-        Returns:
-            w of each demonstration (N, k), and w of the plan (k,).
+        Exact components are brought to the aim, the others moved as far as the plan is: w of each
+        demonstration (N, k), and of the plan (k,). A demonstration that such a plan is not made of
+        is at infinity.
         """
         (base,), (weights,) = self.base(aim[None])
         exact, farthest = self.symmetry.exact, self.symmetry.farthest

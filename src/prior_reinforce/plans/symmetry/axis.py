@@ -83,12 +83,9 @@ def hand_paths(
 ) -> Float[np.ndarray, "N H 2"] | None:
     """Return where the hand goes, seen from above, [m]; None where plans do not say it.
 
-    Args:
-        symmetry: Its turn names the columns of poses or increments.
-        plans: Shape (N, H, D).
-        chain: The arm, where plans are of its joints; None takes the turn's own.
-        joints: Columns of its joints, in its order.
-        tip: The hand in the flange's frame of joints, [m].
+    The symmetry's turn names the columns of poses or increments; the chain is the arm, where plans
+    are of its joints, in these columns (None takes the turn's own), and `tip` the hand in its
+    flange's frame, [m].
     """
     for move in symmetry.moves:
         if isinstance(move, TurnPoses):
@@ -105,10 +102,7 @@ def hand_paths(
 def find_axis(paths: Float[np.ndarray, "N H 2"], outcomes: Points, declared: Polar) -> Axis | None:
     """Return what hand paths say of the axis of a turn; None where bearings hardly differ.
 
-    Args:
-        paths: Where the hand goes, N of them.
-        outcomes: (x, y, ...) of each, shape (N, k), in the same unit.
-        declared: The chart with the axis that was declared.
+    Outcomes (N, k) are in the paths' unit; `declared` is the chart with the axis that was declared.
     """
     from scipy.optimize import minimize
 

@@ -28,12 +28,10 @@ STEP = 0.001
 
 
 def build_scene(path: Path, flange: str = "panda/flange") -> mujoco.MjModel:
-    """Compile a task's scene with its tool on the flange of its arm.
+    """Compile a task's scene with its tool on the site of its arm that is the flange.
 
-    Args:
-        path: MJCF of the task. Its body `tool`, written at the top level in the flange's frame,
-            moves onto the flange; everything else stays where it is written.
-        flange: Site of the arm that carries the tool.
+    The MJCF's body `tool`, written at the top level in the flange's frame, moves onto the flange;
+    everything else stays where it is written.
     """
     scene = mujoco.MjSpec.from_file(str(path))
     scene.delete(scene.body("tool"))
