@@ -84,27 +84,62 @@ def read_messages(
     hold it in every frame; FileFormatError if one that moves is told too seldom.
     """
     owner: dict[str, int] = {}
-    for topic, messages in enumerate(topics):
-        for joint in (joint for m in messages for joint in m.content.name):
+    for topic, of_topic in enumerate(topics):
+        for joint in (joint for m in of_topic for joint in m.content.name):
             owner.setdefault(joint, topic)
     wanted = _wanted(bag, topics, owner, options.joints, notes)
-    told: dict[tuple[str, ...], list[Message]] = {}
+    most, messages = _most_telling(topics, owner, wanted)
+    kept, remarks = _of_one_publisher(bag, messages, most)
+    kept, clock, said = _by_clock(bag, kept, most, options.time_column)
+    # Other channels of these messages, such as fingers, stay available by name.
+    names = tuple(n for n in kept[0].content.name if all(n in m.content.name for m in kept))
+    beside = _series_beside(bag, topics, owner, names, wanted, remarks)
+    joined, inside, of_joints = _joined(bag, kept, most, clock, beside, wanted, options)
+    remarks += of_joints
+    if (skipped := len(topics[owner[most[0]]]) - len(kept)) and {*joined}.isdisjoint(wanted):
+        remarks.append(f"{skipped} messages without all joints skipped")
+    # Since the first stamp; since 1970, nanoseconds would be 256 ns coarse as floats.
+    stamps = np.array([m.at(clock) - kept[0].at(clock) for m in kept], dtype=np.float64)[inside]
+    frames = options.clock(name, len(stamps), stamps=stamps, name=_CLOCKS[clock], unit="ns")
+    positions = np.column_stack([_positions(kept, names), *joined.values()])[inside]
+    remarks += [*notes, *said]
+    names += tuple(joined)
+    return recorded(name, frames, positions, names, remarks=tuple(remarks), beside=elsewhere)
+
+
+def _most_telling(
+    topics: Sequence[list[Message]], owner: Mapping[str, int], wanted: Sequence[str]
+) -> tuple[tuple[str, ...], list[Message]]:
+    """The wanted joints of which messages tell most, and these messages; none where none do."""
+    told: dict[tuple[str, ...], list[Message]] = {(): []}
     for topic, messages in enumerate(topics):
         for m in messages:
             own = tuple(j for j in wanted if owner[j] == topic and j in m.content.name)
             if own and len(m.content.position):
                 told.setdefault(own, []).append(m)
-    most = max(told, key=lambda own: len(own) * len(told[own]), default=())
-    kept, remarks = _of_one_publisher(bag, told.get(most, []), most)
-    kept, clock, said = _by_clock(bag, kept, most, options.time_column)
-    # Other channels of these messages, such as fingers, stay available by name.
-    names = tuple(n for n in kept[0].content.name if all(n in m.content.name for m in kept))
-    positions, motion = _positions(kept, names), _positions(kept, most)
-    inside = np.ones(len(kept), dtype=bool)
-    joined: dict[str, list[str]] = {}
+    return max(told.items(), key=lambda item: len(item[0]) * len(item[1]))
+
+
+def _joined(
+    bag: Path,
+    kept: list[Message],
+    most: Sequence[str],
+    clock: str,
+    beside: Sequence[tuple[str, list[Message]]],
+    wanted: Sequence[str],
+    options: ReadOptions,
+) -> tuple[dict[str, Times], np.ndarray, list[str]]:
+    """Joints that other messages tell, at the times of those that are kept.
+
+    Returns which of these all wanted ones span, and remarks. FileFormatError if a wanted one is
+    told too seldom for the motion; others are left out then.
+    """
+    found: dict[str, Times] = {}
+    by_clock: dict[str, list[str]] = {}
     held: list[str] = []
     seldom: list[str] = []
-    for joint, series in _series_beside(bag, topics, owner, names, wanted, remarks):
+    inside, motion = np.ones(len(kept), dtype=bool), _positions(kept, most)
+    for joint, series in beside:
         by = clock if all(m.sent > 0 for m in series) else _RECORDER
         times, at, values = _series(kept, series, joint, by)
         if len(values) and np.ptp(values) <= _HELD:  # no rate tells more of it
@@ -126,25 +161,17 @@ def read_messages(
                 )
             if joint in wanted:
                 inside &= (times >= at[0]) & (times <= at[-1])
-                joined.setdefault(by, []).append(joint)
-        names = (*names, joint)
-        positions = np.column_stack([positions, np.interp(times, at, values)])
-    for by, those in joined.items():
-        what = f"{say_names(those)} interpolated by {_CLOCKS[by]} at the times of "
-        outside = f"; {np.sum(~inside)} frames that not all span left out" * (not all(inside))
-        remarks.append(f"{what}{say_names(most)}{outside}")
-    remarks += held
+                by_clock.setdefault(by, []).append(joint)
+        found[joint] = np.interp(times, at, values)
+    outside = f"; {np.sum(~inside)} frames that not all span left out" * (not all(inside))
+    at_times = f"at the times of {say_names(most)}{outside}"
+    remarks = [
+        f"{say_names(those)} interpolated by {_CLOCKS[by]} {at_times}"
+        for by, those in by_clock.items()
+    ]
     if seldom and options.key:
-        remarks.append(f"not read: {say_names(seldom)}, told too seldom for the motion")
-    if (skipped := len(topics[owner[most[0]]]) - len(kept)) and not (joined or held):
-        remarks.append(f"{skipped} messages without all joints skipped")
-    # Since the first stamp; since 1970, nanoseconds would be 256 ns coarse as floats.
-    stamps = np.array([m.at(clock) - kept[0].at(clock) for m in kept], dtype=np.float64)[inside]
-    frames = options.clock(name, len(stamps), stamps=stamps, name=_CLOCKS[clock], unit="ns")
-    remarks += [*notes, *said]
-    return recorded(
-        name, frames, positions[inside], names, remarks=tuple(remarks), beside=elsewhere
-    )
+        held.append(f"not read: {say_names(seldom)}, told too seldom for the motion")
+    return found, inside, remarks + held
 
 
 def _wanted(
