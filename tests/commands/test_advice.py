@@ -1,5 +1,6 @@
 """What is said and drawn of a region, and what it needs."""
 
+import json
 import re
 
 import pytest
@@ -74,3 +75,6 @@ def test_where_a_turn_was_found_no_throw_and_no_demonstration_teaches_most(run, 
     assert status == 0
     assert "hit is likeliest at" in out
     assert "teaches most" not in out
+    advised = json.loads(run("advise", folder, "--json")[1])
+    for goal in (advised["best"], advised["worst"]):  # of goals that can be set
+        assert run("goal", folder, *map(str, goal))[0] == 0

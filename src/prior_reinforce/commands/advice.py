@@ -60,7 +60,8 @@ class Advise(OnWorkspace):
             )
         demonstrations = session.generator.with_symmetry_used(session.demonstrations)
         outcomes, moved = demonstrations.outcomes_seen, demonstrations.symmetry is not None
-        low, high = region_around(demonstrations) if moved else _around(outcomes)
+        declared = session.demonstrations.symmetry is not None  # goals may lie farther off
+        low, high = region_around(demonstrations) if declared else _around(outcomes)
         goals = _grid(low, high)
         conditions = np.array([adapter.propose(goal) for goal in goals])
         p = p_hit(conditions, goals, session.tolerance)
@@ -107,10 +108,11 @@ class Advise(OnWorkspace):
             )
             print_json(record)
             return
+        where = "region around what was shown" if declared else "demonstrated region"
         print(
-            f"in the {'region around what was shown' if moved else 'demonstrated region'} a first "
-            f"throw's hit is likeliest at {say_place(goals[best], form)} ({say_chance(p[best])}), "
-            f"least likely at {say_place(goals[worst], form)} ({say_chance(p[worst])})"
+            f"in the {where} a first throw's hit is likeliest at {say_place(goals[best], form)} "
+            f"({say_chance(p[best])}), least likely at {say_place(goals[worst], form)} "
+            f"({say_chance(p[worst])})"
         )
         if reached is not None:
             print(_say_reached(reached))
