@@ -13,7 +13,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from prior_reinforce.plans.speeds import largest_of_unit
 from prior_reinforce.report.record import AdaptationRecord
 from prior_reinforce.report.style import (
     DEMONSTRATION,
@@ -26,6 +25,7 @@ from prior_reinforce.report.style import (
     drawing,
     new_figure,
     trial_colour,
+    widen,
 )
 from prior_reinforce.report.summary import CALLED, numbers, say_distance
 from prior_reinforce.session.trials import Stage, Trial
@@ -162,14 +162,14 @@ def draw_plans(record: AdaptationRecord) -> Figure:
             at = next(i for i, trial in enumerate(record.trials) if trial.number == number)
             dotted = styles[at] | {"linestyle": ":", "linewidth": 2.2, "label": _MEASURED}
             panel.plot(times, path[:, j], **dotted)
-        _widen(panel, shown, form.units, j)
+        widen(panel, shown, form.units, j, _LEAST_SHARE)
         panel.set_title(f"{form.names[j]} [{form.units[j]}]", loc="left", fontsize=9.5, color=INK)
         for axes in below:
             scale, unit = (1000, "mrad") if form.units[j] == "rad" else (1, form.units[j])
             for off, style in zip(differences, styles, strict=True):
                 axes.plot(np.arange(len(off)) * form.dt, scale * off[:, j], **style)
             compared = np.stack([off for off in differences if len(off)])
-            _widen(axes, scale * compared, form.units, j)
+            widen(axes, scale * compared, form.units, j, _LEAST_SHARE)
             title = f"minus trial {first} [{unit}]"
             axes.set_title(title, loc="left", fontsize=8.5, color=INK_SOFT)
         if j + columns >= d:
@@ -204,15 +204,6 @@ def _trial_style(record: AdaptationRecord, i: int) -> dict[str, Any]:
         "linewidth": 1.7,
         "linestyle": "--" if trial.stage is Stage.VOIDED else "-",
     }
-
-
-def _widen(axes: Axes, drawn: Float[np.ndarray, "n H D"], units: Sequence[str], j: int) -> None:
-    """Leave room around a joint that hardly moves, so that a sensor's noise does not look wild."""
-    spans = np.ptp(drawn, axis=(0, 1))
-    least = _LEAST_SHARE * largest_of_unit(spans, units)[j]
-    low, high = axes.get_ylim()
-    if high - low < least:
-        axes.set_ylim((low + high - least) / 2, (low + high + least) / 2)
 
 
 def _write(

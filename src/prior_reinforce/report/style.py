@@ -7,12 +7,13 @@ nothing is said by colour alone.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -20,6 +21,7 @@ from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 
 from prior_reinforce.files import in_place
+from prior_reinforce.plans.speeds import largest_of_unit
 
 INK = "#1f2933"
 INK_SOFT = "#616e7c"
@@ -95,6 +97,19 @@ def calm_axes(axes: Axes, *, grid: bool = True) -> None:
     axes.set_axisbelow(True)
     if grid:
         axes.grid(color="#edf0f2", linewidth=0.8)
+
+
+def widen(
+    axes: Axes, drawn: Float[np.ndarray, "n H D"], units: Sequence[str], j: int, share: float
+) -> None:
+    """Leave room around a joint that hardly moves, so that a sensor's noise does not look wild.
+
+    The axis spans at least this share of the largest motion in the joint's unit.
+    """
+    least = share * largest_of_unit(np.ptp(drawn, axis=(0, 1)), units)[j]
+    low, high = axes.get_ylim()
+    if high - low < least:
+        axes.set_ylim((low + high - least) / 2, (low + high + least) / 2)
 
 
 def add_legend(

@@ -21,11 +21,7 @@ from prior_reinforce.arm.console.verbs import Seen, Verbs
 from prior_reinforce.arm.console.view import ConsoleState
 from prior_reinforce.arm.recordings import ReadOptions, Recordings, inspect, read
 from prior_reinforce.arm.recordings.naming import find_channels, numbered_like
-from prior_reinforce.arm.recordings.outcomes import (
-    OUTCOMES_FILE,
-    keep_places,
-    places_of,
-)
+from prior_reinforce.arm.recordings.outcomes import OUTCOMES_FILE, keep_places, places_of
 from prior_reinforce.arm.recordings.selection import Selection
 from prior_reinforce.arm.recordings.units import Ambiguity, say_names
 from prior_reinforce.errors import (

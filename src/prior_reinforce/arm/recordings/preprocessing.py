@@ -13,12 +13,7 @@ import numpy as np
 from jaxtyping import Float
 from msgspec import Meta
 
-from prior_reinforce.arm.recordings.artefacts import (
-    failed_reads,
-    held_frames,
-    refuse_leaps,
-    stalls,
-)
+from prior_reinforce.arm.recordings.artefacts import failed_reads, held_frames, refuse_leaps, stalls
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.time_finder import LONGEST
 from prior_reinforce.arm.recordings.units import say_names

@@ -204,6 +204,8 @@ class Preview:
         return f"hull in {name} of {area:.3g}{square} by {len(corners)} of {demos.n}; {nearest}"
 
     def _draw_channel(self, axes: Any, channel: int, colours: list[Any]) -> None:
+        from prior_reinforce.report.style import widen
+
         demos, form = self.demonstrations, self.demonstrations.format
         times = np.arange(demos.horizon) * form.dt
         starts = self.inspection.processed.starts
@@ -218,12 +220,7 @@ class Preview:
         changes = self._changes(channel)
         for at in changes:
             axes.axvline(at, color="0.5", linewidth=0.6, linestyle=":", zorder=0)
-        # A channel that hardly moves must not look as if it did.
-        low, high = axes.get_ylim()
-        like = np.array(form.units) == form.units[channel]
-        least = _LEAST_RANGE * float(np.ptp(demos.plans, axis=(0, 1))[like].max())
-        if high - low < least:
-            axes.set_ylim((low + high - least) / 2, (low + high + least) / 2)
+        widen(axes, demos.plans, form.units, channel, _LEAST_RANGE)
         kind = ", changes dotted" if len(changes) else ""
         axes.set_title(f"{form.names[channel]} [{form.units[channel]}]{kind}", fontsize=10)
         axes.set_xlabel("time from the plan's start [s]", fontsize=8)
