@@ -154,17 +154,10 @@ class ModelClient(Protocol):
         """Who answers, for the record."""
 
     def ask(self, words: str, picture: Picture) -> Answer:
-        """Ask for one object.
+        """Ask for one object (`the orange ball`) in a picture of the size that shall be seen.
 
-        Args:
-            words: The object, for instance `the orange ball`.
-            picture: RGB, of the size in which it shall be seen.
-
-        Returns:
-            The words of the answer; nobody has looked for a box in them yet.
-
-        Raises:
-            EndpointError: Nothing came back, and trying again at once will not help.
+        Nobody has looked for a box in the answer yet. EndpointError if nothing came back, and
+        trying again at once will not help.
         """
 
     def close(self) -> None:

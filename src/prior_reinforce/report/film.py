@@ -34,18 +34,9 @@ def record_film(
 ) -> Film:
     """Write `<stem>.mp4` and, as one picture, its key moments to `<stem>-film.png`.
 
-    Nothing is left behind when `pictures` raises, for instance RenderingUnavailableError.
-
-    Args:
-        pictures: Each (height, width, 3) of uint8, all of one size; taken one by one.
-        folder: Where to write; made if need be.
-        stem: Beginning of the files' names.
-        fps: Pictures a second.
-        moments: Key moments in the strip.
-
-    Raises:
-        ConfigurationError: No pictures, or of wrong or different shape or type.
-        RenderingUnavailableError: ffmpeg failed; the message says what it said.
+    The pictures are (height, width, 3) of uint8, all of one size, and taken one by one, `fps` a
+    second; nothing is left behind when they raise. ConfigurationError for none, or others;
+    RenderingUnavailableError, with what ffmpeg said, if that failed.
     """
     from prior_reinforce.report.style import save_figure
 

@@ -55,22 +55,18 @@ def write_report(
     A picture that an earlier report left there is drawn again only if what it shows has changed,
     so that goals that are over cost nothing; those of goals that this one has not are removed.
 
+    Returns the path of the page. ConfigurationError for no adaptations, two of one number, or a
+    region of wrong shape.
+
     Args:
-        folder: Where to write; made if need be. A film elsewhere is copied here when it is too
-            large to go into the page.
-        adaptations: Goals in the order to be shown, at least one.
+        folder: Made if need be. A film elsewhere is copied here if it is too large for the page.
+        adaptations: Goals in the order to be shown.
         title: Of the page.
         facts: What made these results: generator with its remarks, adapter, perception, seeds.
         region: Region of goals, lower and upper corner, shape (2, k).
         note: What else is to be said under the headline.
         reach: Picture (PNG) of the goals that can be reached, if there is one.
         progress: Called with the number of goals drawn, and of all, after each.
-
-    Returns:
-        Path of the page.
-
-    Raises:
-        ConfigurationError: No adaptations, two of one number, or a region of wrong shape.
     """
     if not adaptations:
         raise ConfigurationError("a report needs at least one adaptation, got none")

@@ -21,11 +21,7 @@ if TYPE_CHECKING:
 
 
 class RecordingPerception(Perception):
-    """A perception by pictures that leaves every picture, with boxes, and every answer on disk.
-
-    Attributes:
-        latest: The latest picture; None where there is none.
-    """
+    """A perception by pictures that leaves every picture, with boxes, and every answer on disk."""
 
     def __init__(self, perception: VisionLanguageModel, folder: Path, stem: str) -> None:
         """Keep readings of what comes one after another in a folder, called `stem` and a number."""
@@ -34,6 +30,7 @@ class RecordingPerception(Perception):
         self._stem = stem
         self._n_readings = 0
         self.latest: Path | None = None
+        """The latest picture."""
 
     def perceive(self, rollout: Rollout, goal: Point, rng: np.random.Generator) -> Reading:
         """Look, and keep what was shown and said, also where it failed."""

@@ -221,10 +221,7 @@ class _Watched:
     def _send_to_all(self, *numbers: int) -> dict[int, str]:
         """Send signals to all that runs, which is returned; but for SIGKILL, once to each.
 
-        The command gets them though the others cannot be found.
-
-        Raises:
-            OSError: They cannot.
+        OSError if that cannot be found; the command gets them all the same.
         """
         error, running = None, {}
         try:

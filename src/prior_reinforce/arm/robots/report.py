@@ -64,20 +64,10 @@ def worst_place(
 ) -> LimitLine:
     """The worst place: of what refuses where anything does, else of what is nearest to warning.
 
-    What is no number refuses.
-
-    Args:
-        check: As in `LimitLine`.
-        unit: Of `value` and `limit`: one for all joints, or one each.
-        says: The line's text, one for all joints or one each; `{joint}`, `{value}`, `{unit}`,
-            `{limit}`, `{margin}`, `{percent}`, `{time}` and `{within}` stand for those of the worst
-            place.
-        joints: Names of the d joints or axes.
-        t: From the plan's first frame.
-        value: Of each joint at each time.
-        limit: Of `value` at each time, of each joint, or of all.
-        warn: Share of a limit from which on it warns.
-        used: Share of the limit that is used, 1 and more being refused; None is value / limit.
+    What is no number refuses. `unit` and `says` are one for all joints, or one each; in the line's
+    text `{joint}`, `{value}`, `{unit}`, `{limit}`, `{margin}`, `{percent}`, `{time}` and `{within}`
+    stand for those of the worst place. From `warn` times a limit on it warns, and from a share
+    `used` of 1 on it refuses; that is value / limit if not given.
     """
     limits = np.broadcast_to(limit, value.shape)
     if used is None:

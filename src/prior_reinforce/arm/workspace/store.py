@@ -44,10 +44,8 @@ _DIGITS = 16
 class Store:
     """Where the files lie.
 
-    Raises:
-        WorkspaceError: The disk is full, or the folder read-only.
-        FileFormatError: A file is missing, damaged, another one, or led to by a link out of the
-            workspace.
+    WorkspaceError if the disk is full, or the folder read-only; FileFormatError if a file is
+    missing, damaged, another one, or led to by a link out of the workspace.
     """
 
     def __init__(self, folder: Path) -> None:

@@ -247,8 +247,7 @@ def first_descent(
 ) -> tuple[int, float, Float[np.ndarray, "2"]] | None:
     """Return where a path in [m] first passes a height downwards, by linear interpolation, or None.
 
-    Returns:
-        The last row above, the part of a row after it, and (x, y) there.
+    That is the last row above, the part of a row after it, and (x, y) there.
     """
     down = np.flatnonzero((path[:-1, 2] >= height) & (path[1:, 2] < height))
     if not down.size:
