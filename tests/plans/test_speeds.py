@@ -10,9 +10,9 @@ from prior_reinforce.plans.speeds import (
     middle,
     motion_span,
     onset,
-    recorded_speeds,
     velocity_profiles,
 )
+from reproduction.recipes.alignment import recorded_speeds
 
 STARTS = np.array([5, 31, 12, 44])
 

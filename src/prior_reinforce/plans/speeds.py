@@ -69,16 +69,6 @@ def velocity_profiles(
     return [velocity / scale for velocity in velocities]
 
 
-def recorded_speeds(plans: Float[np.ndarray, "N H D"], units: Sequence[str]) -> np.ndarray:
-    """Return how fast each plan moves frame by frame, to show rather than to compare: (N, H).
-
-    Not smoothed, each channel relative to the largest range among the channels of its unit.
-    """
-    largest = largest_of_unit(np.ptp(plans, axis=1).max(axis=0), units)
-    scaled = plans / np.maximum(largest, _NO_MOTION)
-    return np.asarray(np.linalg.norm(np.gradient(scaled, axis=1), axis=-1))
-
-
 def onset(speed: Speed) -> float:
     """Return the first frame that counts as moving."""
     return float(np.argmax(speed > MOVING * speed.max()))

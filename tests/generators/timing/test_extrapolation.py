@@ -5,7 +5,7 @@ import numpy as np
 from prior_reinforce.generators.timing.extrapolation import ExtrapolatedPlans
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.plan_format import PlanFormat
-from prior_reinforce.plans.speeds import recorded_speeds
+from reproduction.recipes.alignment import recorded_speeds
 
 STARTS = np.array([5, 31, 12, 44])
 NO_JUMPS = np.zeros(3, dtype=bool)

@@ -12,11 +12,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial.transform import Rotation
 
 from prior_reinforce.plans.interpolation import minimum_jerk
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.simulation.tasks.curling import FRICTION, STONE_RADIUS, STONE_START, Curling
-from prior_reinforce.simulation.tasks.inverse_kinematics import joint_paths, to_rotation_vector
+from prior_reinforce.simulation.tasks.inverse_kinematics import NOMINAL, joint_paths
 from reproduction.demonstrations import DRAWN, seed_and_aims, warps, write_sets
 from reproduction.demonstrations.teleoperation import Teleoperation, record
 from reproduction.following import warped
@@ -102,6 +103,11 @@ def push(
     handle = np.cos(angle) * down - np.sin(angle) * forward
     attitudes = np.stack([np.cross(-left, handle), np.tile(-left, (horizon, 1)), handle], axis=-1)
     return np.hstack([bar - HANDLE * handle, to_rotation_vector(attitudes)])
+
+
+def to_rotation_vector(attitudes: Float[np.ndarray, "*n 3 3"]) -> Float[np.ndarray, "*n 3"]:
+    """Rotation vectors in [rad] from flange attitudes: undoes `to_matrix`."""
+    return Rotation.from_matrix(attitudes @ NOMINAL.T).as_rotvec()
 
 
 def speed_for(distance: float) -> float:

@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from prior_reinforce.generators.timing.alignment import align
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.speeds import middle, onset, recorded_speeds
+from prior_reinforce.plans.speeds import largest_of_unit, middle, onset
 from prior_reinforce.simulation.tasks import make_task
 from reproduction.recipes.base import TASK, Picture, Planned, Recipe, Scale
 from reproduction.recipes.tables import Columns, Table
@@ -24,6 +25,8 @@ from reproduction.units import Unit
 
 _TASKS = (TASK, "curling", "fishing")
 """Hardware variants have the demonstrations of the first."""
+_NOTHING = 1e-12
+"""A range below this is rounding, not motion."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,16 @@ class Aligned(Unit):
             middle_s=middles,
             aligned_middle_s=aligned_middles,
         )
+
+
+def recorded_speeds(plans: Float[np.ndarray, "N H D"], units: Sequence[str]) -> np.ndarray:
+    """Return how fast each plan moves frame by frame, to show rather than to compare: (N, H).
+
+    Not smoothed, each channel relative to the largest range among the channels of its unit.
+    """
+    largest = largest_of_unit(np.ptp(plans, axis=1).max(axis=0), units)
+    scaled = plans / np.maximum(largest, _NOTHING)
+    return np.asarray(np.linalg.norm(np.gradient(scaled, axis=1), axis=-1))
 
 
 def _moments(moment: Callable[[Any], float], demonstrations: Demonstrations) -> list[float]:

@@ -47,11 +47,6 @@ def to_matrix(rotation_vectors: Float[np.ndarray, "*n 3"]) -> Float[np.ndarray, 
     return Rotation.from_rotvec(vectors).as_matrix() @ NOMINAL
 
 
-def to_rotation_vector(attitudes: Float[np.ndarray, "*n 3 3"]) -> Float[np.ndarray, "*n 3"]:
-    """Rotation vectors in [rad] from flange attitudes: undoes `to_matrix`."""
-    return Rotation.from_matrix(attitudes @ NOMINAL.T).as_rotvec()
-
-
 def joint_paths(poses: Float[np.ndarray, "n H 6"], dt: float) -> Float[np.ndarray, "n H 7"]:
     """Joint paths in [rad] that carry the flange along pose paths, a frame each dt [s].
 
