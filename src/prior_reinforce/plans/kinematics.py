@@ -170,6 +170,8 @@ def turned_path(
     stay held as long as six others move. The axis is at `centre`, (x, y) in the base frame; angles
     are in [rad]. OutOfReachError if a pose of the turned path cannot be reached.
     """
+    from scipy.spatial.transform import Rotation
+
     given, about, q = flange_path(chain, joints), np.array([*centre, 0.0]), np.array(joints)
     free = np.ptp(joints, axis=0) > _HELD
     weight = (free if free.sum() >= 6 else np.ones(len(free), dtype=bool)).astype(float)[:, None]
@@ -180,7 +182,7 @@ def turned_path(
             now = flange_path(chain, q)
             left = turn @ given.attitudes @ np.swapaxes(now.attitudes, 1, 2)
             off[:, :3] = (given.places - about) @ turn.T + about - now.places
-            off[:, 3:] = _rotation_vectors(left)
+            off[:, 3:] = Rotation.from_matrix(left).as_rotvec()
             if np.abs(off).max() < _SOLVED:
                 break
             back = np.swapaxes(now.jacobians, 1, 2) * weight
@@ -207,9 +209,3 @@ def rotations_about(
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     sin, cos = np.sin(angles)[:, None, None], np.cos(angles)[:, None, None]
     return np.asarray(np.eye(3) + sin * cross + (1.0 - cos) * (cross @ cross))
-
-
-def _rotation_vectors(matrices: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, "n 3"]:
-    from scipy.spatial.transform import Rotation
-
-    return np.asarray(Rotation.from_matrix(matrices).as_rotvec())

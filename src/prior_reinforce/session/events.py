@@ -17,16 +17,12 @@ from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.readings import ReadingRecord
 
 
-def _snake_case(name: str) -> str:
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
-
-
 class Event(
     msgspec.Struct,
     frozen=True,
     kw_only=True,
     tag_field="kind",
-    tag=_snake_case,
+    tag=lambda name: re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower(),  # `goal_set`
     forbid_unknown_fields=True,
     omit_defaults=True,
 ):

@@ -66,7 +66,8 @@ def executing_lock(
     WorkspaceError if the folder cannot be opened, or its file system has no locks.
     """
     deadline = time.monotonic() + _WAIT_S
-    name = _name_of_arm(arm)
+    arm = arm or os.environ.get(ARM_VARIABLE, "")
+    name = f"arm-{hashlib.sha256(arm.encode()).hexdigest()[:32]}"
     seen = last_stop(folder) if stop_seen is None else stop_seen
     with ExitStack() as stack:
         names, descriptors = [name], []
@@ -213,11 +214,6 @@ def stop_marked(name: str, kill_at: float) -> None:
                         os.kill(pid, number)
                         os.kill(pid, signal.SIGCONT)
         time.sleep(_POLL_S)
-
-
-def _name_of_arm(arm: str) -> str:
-    arm = arm or os.environ.get(ARM_VARIABLE, "")
-    return f"arm-{hashlib.sha256(arm.encode()).hexdigest()[:32]}"
 
 
 def _name_of_folder(folder: Path) -> str:

@@ -197,9 +197,11 @@ class Journal(Log):
         if id_ != number:
             raise self._damaged(f"event {number} is missing")
         # Damaged, they may be no texts.
-        if not isinstance(time, str) or not isinstance(text, str):
-            raise self._damaged(f"event {number} is not what was written")
-        if _digest(self._last_digest, time, text) != digest:
+        if not (
+            isinstance(time, str)
+            and isinstance(text, str)
+            and _digest(self._last_digest, time, text) == digest
+        ):
             raise self._damaged(f"event {number} is not what was written")
         try:
             event = self._decoder.decode(text)

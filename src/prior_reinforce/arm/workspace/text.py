@@ -141,14 +141,10 @@ def next_step(now: Standing) -> str:
     """The command that comes next; see `Standing.step`. While the arm moves, wait for it before."""
     step = _next_step(now)
     if now.state.moves and now.moving:
-        return f"{say_moving(now)}; wait for its end, then: {step}"
+        running = [f"pid {pid}: {name:.80}" for pid, name in programs_executing(now.folder)]
+        by = plain("".join(f" ({each})" for each in running[:1]))
+        return f"the arm's program still runs{by}; wait for its end, then: {step}"
     return step
-
-
-def say_moving(now: Standing) -> str:
-    """Say that a motion is made right now, and by what program."""
-    programs = [f"pid {pid}: {command:.80}" for pid, command in programs_executing(now.folder)]
-    return plain("the arm's program still runs" + "".join(f" ({each})" for each in programs[:1]))
 
 
 def _next_step(now: Standing) -> str:
