@@ -67,8 +67,9 @@ def read_urdf(
         for link in {tip, base} - {None, *links}:
             few = ", ".join(links[:_MOST_NAMED])
             raise ConfigurationError(f"it has no link {link!r}; it has {few}")
-        tree = Tree(links, moving, base or links[0], still, meshes) if tip is None else None
-        if tree is not None:
+        tree = None
+        if tip is None:
+            tree = Tree(links, moving, base or links[0], still, meshes)
             tip = tree.flange()
         chain, way = joints_to(tip, moving, base), joints_to(tip, moving)
         if base is not None and (not chain or chain[0].parent != base):
