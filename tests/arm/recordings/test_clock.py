@@ -53,6 +53,18 @@ def test_a_unit_in_the_name_or_of_the_format_is_no_doubt():
         clock_of("a", 5, stamps=stamps, name="t_ms", time_unit="s")
 
 
+@pytest.mark.parametrize(
+    ("head", "step"),
+    [("time [0.1 ms]", 100.0), ("t [100us]", 100.0), ("t (10 ms)", 1.0), ("t [0.01 s]", 1.0)],
+)
+def test_a_unit_of_time_may_stand_behind_a_number(head, step):
+    clock = clock_of("a", 5, stamps=np.arange(5) * step, name=head)
+    assert (clock.times[-1], clock.ambiguities) == (pytest.approx(0.04), ())
+    said = clock_of("a", 5, stamps=np.arange(5) * step, name=head, rate=100.0)
+    np.testing.assert_allclose(said.times, clock.times)
+    assert declared_rate("a", {"dt [10 ms]": 1.0})["own_rate"] == pytest.approx(100.0)
+
+
 @pytest.mark.parametrize("rate", [5, 100, 1000])
 def test_plausible_seconds_are_taken_as_they_are(rate):
     clock = clock_of("a", 9, stamps=np.arange(9) / rate, name="t")

@@ -32,6 +32,7 @@ from prior_reinforce.arm.recordings.time_finder import (
 )
 from prior_reinforce.arm.recordings.units import SECONDS, Ambiguity, judge_unit, split_unit
 from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidDemonstrationsError
+from prior_reinforce.units import base_of, without_number
 
 if TYPE_CHECKING:
     from prior_reinforce.arm.recordings.options import ReadOptions
@@ -82,7 +83,7 @@ def declared_rate(
                 f"{where}: {name} is no number; expected times t, or dt, or rate: mend it, or "
                 "leave it unread with --time-column none --rate HZ"
             )
-        number = float(value) * SECONDS[unit or "s"]
+        number = float(value) * base_of(unit or "s")[1]
         found[name] = 1 / number if is_period and number else number
     first, of_first = next(iter(found.items()), ("", 0.0))
     for name, rate in found.items():
@@ -179,6 +180,9 @@ def clock_of(
             "one time a frame"
         )
     known = unit or split_unit(name, SECONDS)[1]
+    if known is not None and known != FRAME:
+        known, of_one = without_number(known)  # of `t [0.1 ms]`
+        numbers = numbers * of_one if of_one != 1 else numbers
     if known is None and time_unit is None and are_ticks(numbers):
         numbers, known = (numbers - numbers[0]) * 100, "ns"
     unknown = None if known or time_unit else _IN_BRACKETS.search(name)
