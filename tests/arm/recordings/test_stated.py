@@ -111,6 +111,21 @@ def test_the_only_array_that_may_be_the_motion_is_it(name, keys):
         assert motion_keys("a.npz", ReadOptions(), shapes, ("q",)) == keys
 
 
+@pytest.mark.parametrize("key", ["joint_torques", "obs/ddq", "q_error", "observation.effort"])
+def test_torques_that_are_named_as_the_motion_are_no_joints(key):
+    arrays = {key: Q, "t": np.arange(101) / 50}
+    with pytest.raises(FileFormatError, match=r"no positions: record those.*--key"):
+        motion_keys("a.npz", ReadOptions(), {key.split(".")[-1]: Q}, ("q",))
+    for texts in ({}, {"joint_names": UR}):  # whether or not the file names its columns
+        options = ReadOptions(key=(key,), joints=UR)
+        with pytest.raises(FileFormatError, match=f"{key} looks like .*torques.*--key"):
+            recorded_among(Path("a.h5"), "a", (key,), arrays, options, texts=texts)
+    plain = ReadOptions(key=(key,), joints=("tau1", "tau2", "tau3"))
+    assert (
+        recorded_among(Path("a.h5"), "a", (key,), arrays, plain, texts={}).positions.shape[1] == 3
+    )
+
+
 @pytest.mark.parametrize("q", [np.zeros(20), np.zeros((20, 6), dtype=bool), np.array(["a"])])
 def test_an_array_that_holds_no_motion_is_named_with_its_shape_and_type(q):
     with pytest.raises(FileFormatError) as refused:

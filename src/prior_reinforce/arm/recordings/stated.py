@@ -37,7 +37,13 @@ from prior_reinforce.arm.recordings.tables import Table
 from prior_reinforce.arm.recordings.time_finder import rises, says_time
 from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, Ambiguity, known_unit, say_names
 from prior_reinforce.errors import FileFormatError
-from prior_reinforce.plans.channels import Kind, kinds, one_for_all, says_no_position
+from prior_reinforce.plans.channels import (
+    Kind,
+    is_of_pose,
+    kinds,
+    one_for_all,
+    says_no_position,
+)
 
 if TYPE_CHECKING:
     from prior_reinforce.arm.recordings.options import ReadOptions
@@ -99,9 +105,13 @@ def motion_keys(
             has = f"no array {key}"
             if key in arrays:
                 has = f"{key} of shape {arrays[key].shape} and type {arrays[key].dtype}"
+            remedy = "say which with --key"
+            if there and all(map(says_no_position, there)):
+                remedy = "by their names these are no positions: record those, or if one holds them"
+                remedy += ", --key"
             raise FileFormatError(
                 f"{where} has {has} (expected numbers of shape (T, D)"
-                f"{' or (N, T, D)' * (most > 2)}); it holds {there or fit}: say which with --key"
+                f"{' or (N, T, D)' * (most > 2)}); it holds {there or fit}: {remedy}"
             )
     return keys
 
@@ -134,6 +144,7 @@ def recorded_among(
     `arrays` are all that may say something of it, `texts` what the file says in words, `stated`
     further numbers, such as a rate. `names` are those of the columns, if they are known.
     """
+    _refuse_rates(f"{where}: {episode}", keys[0], options.joints or ())
     count = len(arrays[keys[0]])
     stated = stated or {}
     # A number a frame is (T,), also where it was written as (T, 1) or (1, T).
@@ -161,6 +172,18 @@ def recorded_among(
         unclear = _other_names(episode, texts, positions.shape[1], options.joints or ())
         more["ambiguities"] = (*clock.ambiguities, *unclear)
     return recorded(episode, clock, positions, bare, units=units, **more)
+
+
+def _refuse_rates(where: str, key: str, joints: Sequence[str]) -> None:
+    """FileFormatError if joints are to be what is called velocities, torques or else."""
+    own = _STEMS.split(key)[-1]
+    of_plan = Kind.ANGLE in kinds(joints) and not any(map(says_no_position, joints))
+    if of_plan and says_no_position(own) and not is_of_pose(own):
+        raise FileFormatError(
+            f"{where}: {key} looks like velocities, torques or else, and not the positions of "
+            f"{say_names(joints)}: name what holds those with --key, or record them; if it holds "
+            "them, rename it"
+        )
 
 
 def _refuse_normalised(
