@@ -329,6 +329,31 @@ def test_a_json_beside_a_table_without_heads_names_its_columns(tmp_path, json_na
     np.testing.assert_array_equal(recording.positions, q)
 
 
+@pytest.mark.parametrize(
+    ("comment", "units"),
+    [
+        ("# angles in degrees", ("deg", "deg", None, "rad")),
+        ("# Joint positions [deg], time [ms]", ("deg", "deg", None, "rad")),
+        ("% angle unit = °", ("deg", "deg", None, "rad")),
+        ("#units,s,deg,deg,mm,rad", (None,) * 3 + ("rad",)),  # two
+        ("# recorded without deg to rad", (None,) * 3 + ("rad",)),
+        ("# release angle [deg]: 30", (None,) * 3 + ("rad",)),
+        ({"angle_unit": "deg"}, ("deg", "deg", None, "rad")),
+        ({"units": {"angle": "deg", "time": "ms"}}, ("deg", "deg", None, "rad")),
+        ({"units": ["deg", "rad", "mm", "deg"]}, ("deg", "rad", "mm", "rad")),
+        ({"units": "mm"}, (None,) * 3 + ("rad",)),
+    ],
+)
+def test_comments_and_a_json_beside_say_the_units_that_heads_do_not(tmp_path, comment, units):
+    first = comment if isinstance(comment, str) else "#"
+    rows = "".join(f"{k / 50},{k},{k},{k},{k}\n" for k in range(5))
+    (tmp_path / "throw_0.csv").write_text(f"{first}\nt,j1,j2,gripper,j3_rad\n{rows}")
+    if not isinstance(comment, str):
+        (tmp_path / "meta.json").write_text(json.dumps(comment))
+    (read,) = read_recordings(tmp_path)
+    assert (read.units, read.clock) == (units, "t in s")
+
+
 def test_a_json_of_another_table_names_no_columns(tmp_path):
     np.savetxt(tmp_path / "throw_0.csv", sampled(0, 100)[1], delimiter=",")
     np.savetxt(tmp_path / "throw_1.csv", sampled(1, 100)[1], delimiter=",")

@@ -35,7 +35,13 @@ from prior_reinforce.arm.recordings.recording import (
 )
 from prior_reinforce.arm.recordings.tables import Table
 from prior_reinforce.arm.recordings.time_finder import rises, says_time
-from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, Ambiguity, known_unit, say_names
+from prior_reinforce.arm.recordings.units import (
+    CHANNEL_UNITS,
+    Ambiguity,
+    known_unit,
+    say_names,
+    split_unit,
+)
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.plans.channels import (
     Kind,
@@ -44,6 +50,7 @@ from prior_reinforce.plans.channels import (
     one_for_all,
     says_no_position,
 )
+from prior_reinforce.plans.whole_turns import TURN
 
 if TYPE_CHECKING:
     from prior_reinforce.arm.recordings.options import ReadOptions
@@ -54,8 +61,15 @@ _FRAMES = re.compile(
 )
 _OUTCOME = re.compile(r"(.*[^a-z])?(outcomes?|landings?|landed)([^a-z].*)?", re.IGNORECASE)
 """What an array of where objects landed is called."""
-_UNIT = re.compile(r"((joint|angle|angular|position|motion|rotation)s?_?)?units?", re.IGNORECASE)
+_JOINTS = r"(joint|angle|angular|position|motion|rotation)s?"
+_UNIT = re.compile(rf"(.*\.)?(({_JOINTS}_?)?units?|units?\.{_JOINTS})", re.IGNORECASE)
 """What the joints' units are called among others, deep in what a file says of itself."""
+_UNIT_OF_ALL = re.compile(
+    r"(?:\b(?:units?( of \w+)?|angles|joints|positions|winkel)\s*(?:[:=]|\bin\b|[\[(])|^[#%/]+)"
+    r"\s*(?P<units>(?:[a-z]+|°)(?:\s*[,;]\s*(?:[a-z]+|°))*)\s*(?:[\])]|$|[,;.](?!\d))",
+    re.IGNORECASE,
+)
+"""Words of a comment that are the unit of all: `# angles in deg`, `# units: rad`, `# deg`."""
 _SOUND, _FASTER = 1_000_000, 20
 """Numbers of what moves at another rate than the motion, at most, and how many times the motion's,
 if that is more. Ours: sound has more."""
@@ -302,7 +316,7 @@ def units_said(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
     for key, own in texts.items():
         if "unit" not in key.lower() or says_time(key) or len(own) not in (1, len(names)):
             continue
-        if "." in key and (OTHER_NAMES.search(key) or not _UNIT.fullmatch(key.split(".")[-1])):
+        if "." in key and (OTHER_NAMES.search(key) or not _UNIT.fullmatch(key)):
             continue
         units = [unit if unit in CHANNEL_UNITS else None for unit in map(known_unit, own)]
         if len(own) == 1 and units[0] is not None:
@@ -313,30 +327,42 @@ def units_said(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
 
 
 def headed(table: Table, joints: Sequence[str] | None = None) -> Table:
-    """Return a table without heads under those that a JSON beside it gives to its columns.
+    """Return a table with heads and units that its comments, or a JSON beside it, say.
 
-    It is called as the table, or is the only one of the folder. Names of all columns but the first
-    are taken if that one rises, as times do.
+    The JSON is called as the table, or is the only one of the folder. Names of all columns but the
+    first are taken if that one rises, as times do. Heads of the table's own count more, and a
+    single unit for all is only one of angles.
     """
-    path = Path(table.where)
+    where = path = Path(table.where)
+    texts = dict[str, tuple[str, ...]]()
     found = [path.with_suffix(".json")]
-    if not table.named and not found[0].is_file():
+    if not found[0].is_file():
         found = [p for p in path.parent.glob("*.json") if not p.with_suffix(path.suffix).exists()]
-    if table.named or len(found) != 1 or found[0].stat().st_size > _MOST_SAID:
-        return table
-    texts = said_in({"": found[0].read_bytes()})[0]
-    names = names_said(found[0], texts, len(table.names), joints)
-    if not names and len(table) and rises(table.stamps(0)):
-        names = names_said(found[0], texts, len(table.names) - 1, joints)
+    if len(found) == 1 and found[0].stat().st_size <= _MOST_SAID:
+        where, texts = found[0], said_in({"": found[0].read_bytes()})[0]
+    names = table.names if table.named else names_said(where, texts, len(table.names), joints)
+    if not names and texts and len(table) and rises(table.stamps(0)):
+        names = names_said(where, texts, len(table.names) - 1, joints)
         names = ("t", *names) if names else ()
     if not names:
         return table
-    check_names(found[0], names)
+    check_names(where, names)
     texts = {f".{key}": own for key, own in texts.items()}
+    said = [one["units"] for line in table.comments for one in _UNIT_OF_ALL.finditer(line)]
+    angles = {
+        unit for unit in map(known_unit, re.split(r"[\s,;]+", " ".join(said))) if unit in TURN
+    }
+    if len(angles) == 1:
+        texts |= {"units": (*angles,)}
+    if table.named:
+        texts = {k: own for k, own in texts.items() if len(own) > 1 or known_unit(own[0]) in TURN}
     units = units_said(texts, names)
     if not any(units):  # of the columns but the time's
         units = (None, *units_said(texts, names[1:]))
-    units = tuple(None if says_time(n) else u for n, u in zip(names, units, strict=True))
+    units = tuple(
+        own or (None if says_time(name) or split_unit(name, any_word=True)[1] else unit)
+        for name, own, unit in zip(names, table.units, units, strict=True)
+    )
     return replace(table, names=names, units=units, named=True)
 
 

@@ -171,7 +171,8 @@ def clock_of_table(
     else:
         _check_times(table, [time])
         columns[time] = (columns[time][0], table.numbers(time))
-        unit = times.unit or unit or table.units[time]
+        of_head = table.units[time]
+        unit = times.unit or unit or (of_head if of_head in SECONDS else None)
     if times.unit and len(times.columns) == 2:
         (name, whole), (part_name, part) = (columns[i] for i in times.columns)
         stamps = (whole - whole[0]) / SECONDS[times.unit] + part
