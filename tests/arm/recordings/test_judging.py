@@ -149,6 +149,27 @@ def test_a_gripper_of_0_to_1_is_asked_about_though_it_reaches_all_of_it(most):
     assert asked.option == "--units rad share"
 
 
+@pytest.mark.parametrize(
+    ("plan", "most", "unit"),
+    [
+        ("mm", 0.08, "m"),
+        ("mm", 8, None),
+        ("m", 0.08, None),
+        ("m", 0.8, "UNIT"),
+        ("m", 80, "mm"),
+        ("share", 80, "percent"),
+        ("share", 1.05, None),
+        ("percent", 0.08, "UNIT"),  # a share, or metres
+        ("percent", 1.4, "UNIT"),  # radians
+        ("percent", 80, None),
+    ],
+)
+def test_an_opening_that_no_gripper_has_is_in_another_unit(plan, most, unit):
+    names, units = ("j1", "gripper"), ("rad", plan)
+    asked = select(takes(names, (1, most)), names, names, plan_units=units).ambiguities
+    assert [one.option for one in asked] == [f"--units rad {unit}"] * (unit is not None)
+
+
 def test_radians_in_columns_that_say_degrees_are_remarked_on():
     found = select(takes(("j1", "j2"), (1.2, -1.6), units=[("deg", "deg")]))
     assert found.ambiguities == ()

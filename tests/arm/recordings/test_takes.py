@@ -1,5 +1,6 @@
 """Takes in another unit than the others are named, and none is converted by what others state."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -100,6 +101,20 @@ def test_a_unit_that_is_listed_nowhere_is_not_taken_for_another_such_one():
         select(takes(("valve",), [3.0], units=[("bar",)]), units=["psi"])
     (remark,) = select(takes(("pan",), [30.0], units=[("Grad",)]), units=["deg"]).remarks
     assert "pan recorded in Grad in t0, taken for deg" in remark
+
+
+@pytest.mark.parametrize(
+    ("recorded", "wanted", "said", "scale"),
+    [("m", "percent", "1250 percent", 1250), ("mdeg", "rad", "0.001 deg", math.pi / 180_000)],
+)
+def test_what_one_of_a_unit_is_may_be_said(recorded, wanted, said, scale):
+    """A gripper's metres in percent, or a word: the refusal names such an option."""
+    told, plan = takes(("j1", "gripper"), [0.3, 0.08], units=[(None, recorded)]), ("rad", wanted)
+    with pytest.raises(ConfigurationError, match=f"in {recorded}, but .* --units .*'{said}'"):
+        select(told, plan_units=plan)
+    found = select(told, units=["rad", said], plan_units=plan)
+    assert found.recordings[0].positions[-1, 1] == pytest.approx(0.08 * scale)
+    assert f"recorded in {recorded} in t0, taken for {said}" in " ".join(found.remarks)
 
 
 def test_joints_in_one_unknown_word_are_one_remark():

@@ -33,6 +33,7 @@ _MOST_PERCENT = 110.0
 _HARDLY_DEG, _STILL_DEG = 2.0, 0.1
 """Degrees within which a recorded arm hardly moves, and within which a joint is still. Ours."""
 _OF_COUNTS = " ('0.088 deg' for 4096 counts a turn, their middle subtracted in the file)"
+_OF_OPEN = " (100 over its number when fully open: '0.1 percent' if its range is 0 to 1000)"
 _NOT_DONE, _HARDLY = "which no arm does", "which is hardly a motion"
 _SHARES = (
     "LeRobot recorded shares of each joint's range (-100 to 100, or 0 to 100, where use_degrees is "
@@ -209,8 +210,10 @@ class Judge:
             return Doubt("deg", why) if one in self.far and looks != "deg" else None
         if one in self.far and self._counts_turns(self.far):
             return Doubt(UNIT, "which is rad if it counts turns, deg if the others are still")
+        if one.unit == "mm":  # hardly open
+            why = _HARDLY
         if one.unit == "percent":
-            why = _HARDLY if looks else "which no share of a range does"
+            why = _HARDLY if one.largest <= 100 else "which no share of a range does"
             if self.given and self.silent and one.stated and one.largest > _MOST_PERCENT:
                 raise ConfigurationError(
                     f"{one.where} reaches {one.largest:.4g}, and --units says percent, of which a "
@@ -280,7 +283,7 @@ class Judge:
             seen = f"it looks like {doubt.looks}"
             if doubt.looks == UNIT:
                 seen = f"put its unit in the place of {UNIT}"
-                seen += " ('0.1 percent' if its range is 0 to 1000)" * (unit == "percent")
+                seen += _OF_OPEN * (unit == "percent")
                 seen += _OF_COUNTS * (unit in TURN and worst not in self._slides)
             elif worst in unsure:
                 seen = f"put deg in the place of {UNIT}, unless {_SHARES}"

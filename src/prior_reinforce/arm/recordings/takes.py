@@ -84,9 +84,10 @@ def in_one_unit(
         stated.append(said or first)
         for own, of_unit in takes.items():
             by = factor(own, said or str(first))
-            is_word = by is None and not spelt(without_number(own)[0])
-            if is_word and said is not None and spelt(said):
-                by = 1.0  # `Grad`, which is no listed unit
+            of_one, number = without_number(said or "")
+            told = number != 1 or not spelt(without_number(own)[0])
+            if by is None and told and spelt(of_one):
+                by = 1.0  # `Grad`, which is no listed unit; or m, of which one is 1250 percent
                 words.setdefault((own, called[own], said), []).append(name)
             elif said not in (None, own):
                 raise ConfigurationError(

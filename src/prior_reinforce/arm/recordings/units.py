@@ -15,6 +15,7 @@ from prior_reinforce.units import (
     UNITS,
     factor,
     is_rate,
+    kind_of,
     spelt,
     spoken,
     units_of,
@@ -36,14 +37,17 @@ _PLAUSIBLE: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "rad/s": {"rad/s": (0.0, 15.0), "deg/s": (0.0, 900.0)},
     "m/s": {"m/s": (0.0, 15.0), "mm/s": (0.0, 15e3)},
     "percent": {"share": (0.0, 1.1), "percent": (1.1, UNITS["percent"].largest)},
-    "opening": {"m": (0.0, 0.3), "cm": (0.0, 30.0), "mm": (0.0, UNITS["mm"].largest)},
+    "opening in m": {"m": (0.0, 0.3), "cm": (1.1, 30.0), "mm": (1.1, UNITS["mm"].largest)},
+    "opening in mm": {"mm": (0.3, UNITS["mm"].largest), "m": (0.0, 0.3)},
+    "opening in percent": {"share": (0.1, 1.1), "percent": (2.0, UNITS["percent"].largest)},
+    "opening in share": {"share": (0.0, 1.1), "percent": (2.0, UNITS["percent"].largest)},
     "period": {u: (1 / (_FASTEST * scale), 1 / (_SLOWEST * scale)) for u, scale in SECONDS.items()},
 }
 """Units that angles, lengths and periods may be in, the likeliest first, with the least and the
 greatest number: of angles and lengths the largest one, of periods the time between two frames.
 Ours: no joint turns two turns, or faster than 15 rad/s; above 300, millimetres are likelier than an
-arm of three metres; no gripper opens by 30 cm; one that stays within 1, or hardly beyond, is
-recorded as a share."""
+arm of three metres; no gripper opens by 30 cm, or only by 0.3 mm; one that stays within 1, or
+hardly beyond, is recorded as a share, but below 0.1 as well in metres, and to 2 in radians."""
 _BRACKETS = re.compile(r"(?P<name>.+?)(?: in)?\s*[\[(]\s*(?P<unit>[^\[\]()]+?)\s*[\])]")
 _ENDING = re.compile(r"(?P<name>.+?)(?:[_ ]in)?[_ ](?P<unit>[a-zµμ°]+)")
 _CAMEL = re.compile(r"(?P<name>.*[a-z0-9])(?P<unit>[A-Z][a-z]+|DEG|RAD|MM|CM|MS|US|NS)")
@@ -120,12 +124,14 @@ def conversion(recorded: str, wanted: str, name: str) -> float:
     """Return the factor from one unit to another; ConfigurationError if there is none."""
     scale = factor(recorded, wanted)
     if scale is None:
-        is_word = not spelt(without_number(recorded)[0]) and bool(re.search("[A-Za-z]", recorded))
-        example = f"--units {spoken(wanted)[0]}" if is_word else "--units '0.01 deg'"
-        example = "--units deg/s or mm/s" if is_rate(wanted) else example
+        share = kind_of(wanted) == "share"  # 0.08 m, fully open, are 100 percent
+        example = f"'{1250 if share else 0.001:g} {spoken(wanted)[0]}'"
+        if not spelt(without_number(recorded)[0]) and re.search("[A-Za-z]", recorded):
+            example = f"{spoken(wanted)[0]} or {example}"
+        example = "deg/s or mm/s" if is_rate(wanted) else example
         raise ConfigurationError(
-            f"{name} is recorded in {recorded}, but plans are in {wanted}; say its unit, such as "
-            f"{example}, or correct the plan's units"
+            f"{name} is recorded in {recorded}, but plans are in {wanted}; say what one {recorded} "
+            f"is, such as --units {example}, or correct the plan's units"
         )
     return scale
 
@@ -140,7 +146,8 @@ def judge_unit(
     """
     if number == 0 and not period:
         return unit
-    kind = "period" if period else "opening" if opening and unit == "m" else unit
+    kind = f"opening in {unit}" if opening and f"opening in {unit}" in _PLAUSIBLE else unit
+    kind = "period" if period else kind
     ranges = _PLAUSIBLE.get(kind, {unit: (0.0, float("inf"))})
     fitting = [u for u, (low, high) in ranges.items() if low <= number <= high]
     return unit if unit in fitting else next(iter(fitting), None)
