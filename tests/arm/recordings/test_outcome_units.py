@@ -139,6 +139,27 @@ def test_a_row_in_another_unit_is_named(recording, tmp_path, head, unit):
         import_demonstrations(recording, outcomes=path, outcome_unit=unit, take_guesses=True)
 
 
+@pytest.mark.parametrize("number", [-999, 1e308])
+def test_what_was_not_measured_is_left_out_with_its_recording(recording, tmp_path, number):
+    rows = [f"{name},{x},{y}" for name, (x, y) in OUTCOMES.items()]
+    rows[3] = f"3,{number},{number}"
+    path = table(tmp_path, "\n".join(["episode,x,y", *rows]))
+    with pytest.raises(InvalidDemonstrationsError, match=r"3 .*not measured.*\(--leave-out\)"):
+        import_demonstrations(recording, outcomes=path)
+    kept = import_demonstrations(recording, outcomes=path, leave_out=["3"]).demonstrations
+    assert kept.n == 5
+
+
+@pytest.mark.parametrize(("shift", "said"), [(0.0, True), (1.0, False)])
+def test_an_outcome_at_the_base_is_named_unless_others_lie_around_it(tmp_path, shift, said):
+    places = [(0.9 - 1.5 * shift * (i > 2), 0.1 * (-1) ** i) for i in range(6)]
+    rows = [f"{i},{x},{y}" for i, (x, y) in enumerate([*places, (0, 0)])]
+    found, asked = in_units(
+        read_outcomes(table(tmp_path, "\n".join(["episode,x,y", *rows]))), None, None
+    )
+    assert (["6 landed at 0" in one for one in found.remarks], asked) == ([True] * said, ())
+
+
 def test_a_spread_as_large_as_the_outcomes_lie_apart_is_doubted(recording, tmp_path):
     rows = [f"{name},{x},{y},0.5" for name, (x, y) in OUTCOMES.items()]
     path = table(tmp_path, "\n".join(["episode,x,y,sd", *rows]))

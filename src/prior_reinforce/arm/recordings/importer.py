@@ -25,6 +25,7 @@ from prior_reinforce.arm.recordings.outcomes import (
     beside_tables,
     check_rows,
     in_order,
+    missing_outcomes,
     outcomes_of,
     read_outcomes,
     table_beside,
@@ -278,6 +279,9 @@ class Recordings:
         if isinstance(given, Mapping):
             return found, ()
         found, doubts = beside_tables(found, own, others)
+        chosen = [recording.episode for recording in self.episodes]
+        if self.options.leave_out and not missing_outcomes(chosen, found):
+            found = found.of(chosen)
         found, more = in_units(found, wanted.outcome_units, unit)
         return found, doubts + more
 

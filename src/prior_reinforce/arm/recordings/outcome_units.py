@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -104,6 +104,7 @@ def in_units(
         where += f", in {given} as --outcome-unit says{_INCHES * (given == 'cm')}"
     units = tuple(wanted)
     converted = replace(outcomes, where=where, values=values, sd=sd, units=units, sd_unit=first)
+    converted = replace(converted, remarks=(*converted.remarks, *_unmeasured(converted)))
     apart = float(np.nanmax(np.ptp(values, axis=0), initial=0.0)) if len(values) else 0.0
     most, as_wide = float(sd.max(initial=0.0)), ""
     if len(values) > _FEW and 0 < apart <= most:
@@ -115,6 +116,17 @@ def in_units(
             f"{SD} [{looks}], or {SD} [{first}] if that is right"
         )
     return converted, (*shared, *ambiguities)
+
+
+def _unmeasured(outcomes: Outcomes) -> Iterator[str]:
+    """Say which rows are 0 in every component, where others lie to one side of that."""
+    zero = ~np.any(outcomes.values, axis=1)
+    around = np.all(np.any(outcomes.values < 0, axis=0) & np.any(outcomes.values > 0, axis=0))
+    if outcomes.values.shape[1] > 1 and 0 < zero.sum() < len(zero) / 2 and not around:
+        yield (
+            f"{listed(np.array(outcomes.episodes)[zero].tolist())} landed at 0 in every component, "
+            "where the robot's base is: if that was not measured, leave it out (--leave-out)"
+        )
 
 
 def _shared_unit(
@@ -193,9 +205,9 @@ def _refuse_odd_row(outcomes: Outcomes, units: Sequence[str], given: str | None)
         episodes = listed(np.array(outcomes.episodes)[odd].tolist())
         least, most = np.nanmin(number[~odd]), np.nanmax(number[~odd])
         raise InvalidDemonstrationsError(
-            f"in {outcomes.where}, {episodes} is in another unit than the others: "
-            f"{min(number[odd]):.4g} beside {least:.4g} to {most:.4g}; write all in one, and name "
-            f"it in the head{right}"
+            f"in {outcomes.where}, {episodes} is in another unit than the others, or was not "
+            f"measured: {min(number[odd]):.4g} beside {least:.4g} to {most:.4g}; write all in one, "
+            f"and name it in the head{right}, or leave out what was not measured (--leave-out)"
         )
 
 

@@ -132,6 +132,15 @@ class Outcomes:
         kept = replace(self, scale=tuple(self.scale[i] for i in at))
         return replace(kept, where=where, values=values, names=tuple(names), units=units)
 
+    def of(self, episodes: Sequence[str]) -> Outcomes:
+        """Return the outcomes of some episodes, by the rule of `outcomes_of`."""
+        kept = sorted(rows_of(episodes, self.word, self.episodes).values())
+        rows = {"values": self.values[kept], "sd": self.sd[kept]}
+        names, sources = (
+            tuple(of[row] for row in kept if of) for of in (self.episodes, self.sources)
+        )
+        return replace(self, episodes=names, sources=sources, **rows)
+
     @classmethod
     def of_numbers(cls, where: str, numbers: Mapping[str, Sequence[float]]) -> Outcomes:
         """Outcomes by episode; InvalidDemonstrationsError if they differ in components."""
