@@ -1,11 +1,14 @@
 """Channels are picked and lost frames left out; `test_preprocessing.py` has units and names."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.selection import select
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
+from tests.arm.recordings.recorded import takes
 
 T = np.arange(100) * 0.01
 
@@ -31,6 +34,20 @@ def test_an_episode_that_lost_more_is_refused_by_its_recorded_channel():
     said = "episode throw: actual_q_1 is nan at frame 0, expected a finite number, and 11 of 100"
     with pytest.raises(InvalidDemonstrationsError, match=said):
         select([recording(*range(11))])
+
+
+@pytest.mark.parametrize("fill", [-999.0, 1e308, 32767.0])
+def test_what_was_written_for_failed_reads_is_no_unit_and_no_turn(fill):
+    (told,) = takes(("j1", "elbow", "magnet"), [0.3, 1.2, 0.4])
+    q = told.positions.copy()
+    q[40:43, 1] = fill
+    with pytest.raises(InvalidDemonstrationsError, match=r"elbow is .* in 3 of .* write nan there"):
+        select([replace(told, positions=q)])
+    q[40:43, 1] = np.nan
+    assert "3 frames are left out" in select([replace(told, positions=q)]).recordings[0].remarks[0]
+    q[:, 1:] = 0.0, 0.0
+    q[40:43, 1] = q[60:63, 2] = 1.0  # a switch
+    assert select([replace(told, positions=q)]).recordings[0].positions.max() == 1.0
 
 
 def test_what_is_lost_in_a_channel_that_is_not_taken_does_not_count():

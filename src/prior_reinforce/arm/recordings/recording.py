@@ -197,7 +197,7 @@ def _without_zeros(positions: Positions) -> tuple[int, int]:
         return 0, count
     first, stop = int(others[0]), int(others[-1]) + 1
     steps = np.abs(np.diff(positions[first:stop], axis=0)).max(axis=0)
-    leaps = (steps > 0) & (np.abs(positions[[first, stop - 1]]) > _LEAP * steps)
+    leaps = (steps > 0) & (np.abs(positions[[first, stop - 1]]) / _LEAP > steps)
     begins, ends = leaps.sum(axis=1) >= min(2, positions.shape[1])
     return first if begins else 0, stop if ends else count
 

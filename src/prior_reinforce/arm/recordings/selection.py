@@ -29,6 +29,8 @@ from prior_reinforce.wording import listed
 _MOST_LOST = 0.1
 """Share of an episode's frames that may be lost. Ours: lost packets come in bursts of some frames;
 where more is missing, the recorder failed."""
+_FAR = 5.0
+"""Times as far as in all other frames that a few cannot be. Ours: -999 for what was not read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,6 +293,17 @@ def _picked(recording: Recording, columns: list[int], joints: tuple[str, ...]) -
             )
         count = "frame is" if lost.sum() == 1 else "frames are"
         remarks += (f"{what}; {lost.sum()} {count} left out, as lost packets are",)
+    size, of_kind = np.abs(positions[~lost]), kinds(joints)
+    for i, most in enumerate(size.max(axis=0, initial=0.0)):
+        far, rest = np.flatnonzero(size[:, i] > most / 2), size[size[:, i] <= most / 2, i]
+        back = 0 < len(far) < _MOST_LOST * len(size) and not {0, len(size) - 1} & {*far.tolist()}
+        if back and of_kind[i] is not Kind.TOOL and 0 < _FAR * rest.max() < most:  # and no switch
+            raise InvalidDemonstrationsError(
+                f"episode {recording.episode}: {called[i]} is {positions[~lost][far[0], i]:.4g} in "
+                f"{len(far)} of {len(size)} frames, first in {far[0]}, and {rest.max():.4g} at "
+                "most in all others, as where a read failed: write nan there, so that they are "
+                "left out as lost frames are, or leave that episode out (--leave-out)"
+            )
     units = zip(recording.columns, recording.units, strict=True)
     names = [name + (f" [{unit}]" if unit else "") for name, unit in units]
     beside = columns_beside(names, recording.positions, columns, recording.times)

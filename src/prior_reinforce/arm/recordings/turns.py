@@ -55,6 +55,8 @@ _NOISE = 0.02
 about a turn too. Ours: an encoder's noise."""
 _JOINTS = 4
 """Joints none of which goes below 0 by chance. Ours."""
+_WIDEST = 2
+"""Turns of a recorder's range at most. Ours: joints turn one turn either way."""
 _MOST_TURNS = 12
 """By which an episode is shifted at most. Ours."""
 _Form = Callable[[np.ndarray], np.ndarray]
@@ -394,6 +396,7 @@ def _continued(values: Channel, turn: float, beside: float) -> Channel:
     # The smaller: one bad frame at the cut makes two large steps, which must not excuse each other.
     around = np.minimum(np.abs(left[before]), np.abs(left[after]))
     wraps = (np.abs(steps) > turn / 2) & (np.abs(left) <= 2 * around + beside)
+    wraps &= np.abs(steps) < (_WIDEST + 0.5) * turn  # -999 is none
     if not np.any(wraps):
         return values
     turns = np.round(steps / turn) * wraps
