@@ -354,6 +354,14 @@ def test_comments_and_a_json_beside_say_the_units_that_heads_do_not(tmp_path, co
     assert (read.units, read.clock) == (units, "t in s")
 
 
+@pytest.mark.parametrize("cell", ["{} rad", "{},5"])
+def test_cells_of_numbers_in_other_forms_are_no_names_of_columns(tmp_path, cell):
+    rows = "\n".join(f"{k / 50};{';'.join([cell.format(k)] * 2)};0.{k}" for k in range(5))
+    (tmp_path / "a.csv").write_text(f"t;pan;lift;elbow\n{rows}\n")
+    with pytest.raises(FileFormatError, match=r"pan holds .* and no numbers; write plain numbers"):
+        read_recordings(tmp_path / "a.csv", joints=["pan", "lift", "elbow"])
+
+
 def test_a_json_of_another_table_names_no_columns(tmp_path):
     np.savetxt(tmp_path / "throw_0.csv", sampled(0, 100)[1], delimiter=",")
     np.savetxt(tmp_path / "throw_1.csv", sampled(1, 100)[1], delimiter=",")

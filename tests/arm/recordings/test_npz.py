@@ -376,3 +376,11 @@ def test_episodes_that_rest_at_one_pose_first_are_no_chunks(tmp_path):
     q = ends * np.interp(np.arange(50), [5, 40], [0, 1])[:, None] * np.ones(7)
     np.savez(tmp_path / "all.npz", q=q, t=0.02 * np.arange(50))
     assert len(read_recordings(tmp_path / "all.npz")) == 60
+
+
+@pytest.mark.parametrize("start", [np.datetime64("2024-01-01"), np.timedelta64(0, "us")])
+def test_dates_and_spans_are_times(tmp_path, start):
+    stamps = start + (np.arange(101) * 20_000).astype("timedelta64[us]")
+    np.savez(tmp_path / "throw_0.npz", q=Q, timestamps=stamps)
+    (read,) = read_recordings(tmp_path, take_guesses=True)
+    np.testing.assert_allclose(read.times, np.arange(101) / 50, atol=1e-6)

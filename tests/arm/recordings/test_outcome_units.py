@@ -98,6 +98,17 @@ def test_metres_that_are_said_may_be_as_far_as_a_bat_strikes(recording, tmp_path
         import_demonstrations(recording, outcomes=bare)
 
 
+def test_a_unit_with_a_side_is_told_how_to_say_the_side(recording, tmp_path):
+    rows = [f"{name},{100 * x},{-100 * y}" for name, (x, y) in OUTCOMES.items()]
+    read = {"outcome_names": ("x", "y"), "outcome_units": ("m", "m")}
+    path = table(tmp_path, "\n".join(['episode,x [cm],"y [cm, positive right]"', *rows]))
+    with pytest.raises(ConfigurationError, match="called right"):
+        import_demonstrations(recording, outcomes=path, **read)
+    path = table(tmp_path, "\n".join(["episode,x [cm],right [cm]", *rows]))
+    kept = import_demonstrations(recording, outcomes=path, **read).demonstrations
+    np.testing.assert_allclose(kept.outcomes_seen, list(OUTCOMES.values()))
+
+
 def test_a_unit_that_the_task_does_not_have_says_where_it_stands(recording, tmp_path):
     rows = [f"{name},{x},{y}" for name, (x, y) in OUTCOMES.items()]
     path = table(tmp_path, "\n".join(["episode,x [ml],y [m]", *rows]))

@@ -283,6 +283,7 @@ def test_a_point_before_three_digits_between_semicolons_is_doubted(tmp_path, hea
     ("text", "says"),
     [
         ("episode,x,y\n0,80.0 cm,10 cm\n", r"write 80.0, and the unit in the head: x \[cm\]"),
+        ("episode,x [m],y\n0,80.0 cm,10 cm\n", "write numbers in m, without units"),
         (
             "episode,x,y,sd_x,sd_y\n0,0.8,0.1,0.01,0.02\n",
             "uncertainties in sd_x, sd_y, .*column sd",

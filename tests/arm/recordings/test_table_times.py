@@ -189,11 +189,22 @@ def test_the_rate_in_a_comment_holds_for_a_column_of_frames(tmp_path, said):
     path = table(tmp_path, "frame,a", [np.arange(60), SWING], above=f"# {said}")
     assert read_recordings(path)[0].period == pytest.approx(0.025)
     assert read_recordings(path, rate=40)[0].period == pytest.approx(0.025)
-    with pytest.raises(ConfigurationError, match="says 40 frames a second in its comment"):
+    with pytest.raises(ConfigurationError, match=r"says 40 frames a second by its .*drop"):
         read_recordings(path, rate=100)
     skipping = np.delete(np.arange(61), 30)
     path = table(tmp_path, "frame,a", [skipping, SWING], above=f"# {said}")
     assert read_recordings(path)[0].duration == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize(("head", "number"), [("rate_hz", 40), ("fps", 40), ("dt_ms", 25)])
+def test_a_column_of_one_number_that_is_a_rate_is_that_of_the_frames(tmp_path, head, number):
+    path = table(tmp_path, f"a,{head}", [SWING, np.full(60, number)])
+    assert read_recordings(path, joints=["a"])[0].period == pytest.approx(0.025)
+    if head != "dt_ms":  # else it is summed, and held against the rate as times are
+        with pytest.raises(ConfigurationError, match=f"says 40 .* by its {head}.*drop --rate"):
+            read_recordings(path, joints=["a"], rate=100)
+    path = table(tmp_path, "a,freq", [SWING, np.full(60, 2)])  # of the swing
+    assert read_recordings(path, joints=["a"], rate=100)[0].period == pytest.approx(0.01)
 
 
 def test_a_rate_in_a_comment_says_nothing_against_times(tmp_path):

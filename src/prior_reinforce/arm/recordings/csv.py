@@ -106,8 +106,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
                 )
             column, names, guessed = _throws(table, path.stem, options, alone=len(paths) == 1)
         rows = names.count("")
-        of_none = f"{rows} rows left out, which are of no episode"
-        remarks = (of_none,) * (0 < rows < len(names))
+        remarks = (f"{rows} rows left out, which are of no episode",) * (0 < rows < len(names))
         for episode in sorted({*names} - {""} or {""}, key=natural_order):
             own = table.rows([i for i, name in enumerate(names) if name == episode])
             how = episode, options, column, guessed, remarks
@@ -350,6 +349,7 @@ def _names_in_cells(table: Table, options: ReadOptions) -> tuple[dict[int, str],
     positions. FileFormatError where they change, as they do if two publishers are in one table.
     """
     texts = [i for i in range(len(table.names)) if table.named and table.is_text(i)]
+    texts = [i for i in texts if not re.match(r"[-+.]?\d", table.cells[i][0])]  # `0.3 rad`
     groups = {s: [texts[i] for i in g] for s, g in vectors([table.names[i] for i in texts]).items()}
     groups |= {table.names[i]: [i] for i in texts}
     cells = {stem: _cells(table, group, 0) for stem, group in groups.items()}
@@ -447,4 +447,4 @@ def _of_echo(table: Table) -> Table:
 
 
 def _is_word(cell: str) -> bool:
-    return any(letter.isalpha() for letter in cell) and not is_value(cell)
+    return any(map(str.isalpha, cell)) and not is_value(cell)

@@ -121,7 +121,7 @@ def _arrays(path: Path) -> Arrays:
             return by_field({_MOTION_KEYS[0]: np.load(file, allow_pickle=False)})
     remedy = "it must be an NPZ with plain number arrays; copy it again, or say its format"
     with open_npz(path, remedy, MOST_BYTES) as archive:
-        content = {name: np.asarray(archive[name]) for name in archive.files}
+        content = {name: _as_numbers(np.asarray(archive[name])) for name in archive.files}
         said: Any = {}
         with contextlib.suppress(ValueError, KeyError):
             said = json.loads(str(content["metadata"]))
@@ -132,3 +132,12 @@ def _arrays(path: Path) -> Arrays:
             content.setdefault("names", np.array(form.get("names") or form.get("joint_names")))
             del content["metadata"]
         return by_field(content)
+
+
+def _as_numbers(array: np.ndarray) -> np.ndarray:
+    """Dates and times as numbers of [ns]; other arrays as they are."""
+    return (
+        array.astype(f"{array.dtype.kind}8[ns]").astype(np.int64)
+        if array.dtype.kind in "mM"
+        else array
+    )

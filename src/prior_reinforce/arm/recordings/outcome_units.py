@@ -73,7 +73,8 @@ def in_units(
         if base_of(recorded)[0] != base_of(unit)[0]:
             raise ConfigurationError(
                 f"{name} in {where} is in {recorded}, but its unit is to be {unit}; correct "
-                "either (a workspace has it in workspace.toml, [outcome])"
+                "either (a workspace has it in workspace.toml, [outcome]; in the head, brackets "
+                "hold a unit alone, and what counts to the right is called right)"
             )
         scale.append(conversion(recorded, unit, f"{name} in {where}"))
         most = largest * scale[-1]

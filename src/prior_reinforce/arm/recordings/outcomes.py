@@ -324,7 +324,11 @@ def _finite(table: Table, row: int, column: int) -> float:
             if _SIDED.search(cell):
                 remedy += ", with the sign that the letter says: left is positive, right negative"
         if (said := _WITH_UNIT.fullmatch(cell)) and (unit := known_unit(said[2])):
-            remedy = f"write {said[1]}, and the unit in the head: {name} [{unit}]"
+            bare, head = split_unit(name, any_word=True)
+            remedy = f"write {said[1]}, and the unit in the head: {bare} [{unit}]"
+            remedy = (
+                f"write numbers in {head}, without units" if head not in (None, unit) else remedy
+            )
         raise table.unlike(row, column, f", expected a finite number; {remedy}")
     return value
 

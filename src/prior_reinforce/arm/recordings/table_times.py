@@ -43,14 +43,23 @@ _SAYS = re.compile(
     r"([A-Za-z][A-Za-z_ ]*?)\s*[:=]\s*(\d+\.?\d*(?:[eE][-+]?\d+)?)(?![\d.:-]|,\d)\s*([A-Za-zµ]*)"
 )
 """`fps: 40`, `sample rate = 1 kHz`."""
+_OF_ANYTHING = ("rate", "freq", "frequency", "period")
+"""Names of columns that may be of a swing, or a flow, as well as of frames."""
 _SECONDS = re.compile(r"(?P<stem>.*?)(secs?|seconds|s)")
 _THOUSAND = re.compile(r"\d{1,3}([.,]\d{3})+")
 """`1.000` beside a decimal comma."""
 
 
 def _declared(table: Table, options: ReadOptions) -> dict[str, Any]:
-    """The rate that comments declare, for `clock_of`; ConfigurationError if another is given."""
-    said: dict[str, float] = {}
+    """The rate that comments or a column of one number declare, for `clock_of`.
+
+    ConfigurationError if another is given.
+    """
+    said = {
+        name: float(own[0])
+        for name, own in zip(table.names, table.values.T, strict=True)
+        if len(own) > 1 and np.ptp(own) == 0 and name.lower() not in _OF_ANYTHING
+    }
     for line in table.comments:
         for name, number, unit in _SAYS.findall(line):
             of_time = known_unit(unit) in SECONDS
@@ -61,8 +70,8 @@ def _declared(table: Table, options: ReadOptions) -> dict[str, Any]:
     own, rate = found.get("own_rate"), options.rate
     if own and rate and abs(own - rate) > SAME_RATE * own:
         raise ConfigurationError(
-            f"{table.where} says {own:g} frames a second in its comment {found['rate_name']}, but "
-            f"--rate {rate:g}; drop --rate, or correct that comment"
+            f"{table.where} says {own:g} frames a second by its {found['rate_name']}, but --rate "
+            f"{rate:g}; drop --rate, or correct the file"
         )
     return found
 
