@@ -136,8 +136,5 @@ def _arrays(path: Path) -> Arrays:
 
 def _as_numbers(array: np.ndarray) -> np.ndarray:
     """Dates and times as numbers of [ns]; other arrays as they are."""
-    return (
-        array.astype(f"{array.dtype.kind}8[ns]").astype(np.int64)
-        if array.dtype.kind in "mM"
-        else array
-    )
+    kind = array.dtype.kind
+    return array.astype(f"{kind}8[ns]").astype(np.int64) if kind in "mM" else array

@@ -135,11 +135,10 @@ class Outcomes:
     def of(self, episodes: Sequence[str]) -> Outcomes:
         """Return the outcomes of some episodes, by the rule of `outcomes_of`."""
         kept = sorted(rows_of(episodes, self.word, self.episodes).values())
-        rows = {"values": self.values[kept], "sd": self.sd[kept]}
-        names, sources = (
-            tuple(of[row] for row in kept if of) for of in (self.episodes, self.sources)
-        )
-        return replace(self, episodes=names, sources=sources, **rows)
+        names = tuple(self.episodes[row] for row in kept)
+        sources = tuple(self.sources[row] for row in kept if self.sources)
+        values, sd = self.values[kept], self.sd[kept]
+        return replace(self, episodes=names, values=values, sd=sd, sources=sources)
 
     @classmethod
     def of_numbers(cls, where: str, numbers: Mapping[str, Sequence[float]]) -> Outcomes:

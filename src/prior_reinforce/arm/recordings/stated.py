@@ -353,7 +353,7 @@ def headed(table: Table, joints: Sequence[str] | None = None) -> Table:
         unit for unit in map(known_unit, re.split(r"[\s,;]+", " ".join(said))) if unit in TURN
     }
     if len(angles) == 1:
-        texts |= {"units": (*angles,)}
+        texts |= {"units": tuple(map(str, angles))}
     if table.named:
         texts = {k: own for k, own in texts.items() if len(own) > 1 or known_unit(own[0]) in TURN}
     units = units_said(texts, names)

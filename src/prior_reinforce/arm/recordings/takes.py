@@ -86,7 +86,7 @@ def in_one_unit(
             by = factor(own, said or str(first))
             of_one, number = without_number(said or "")
             told = number != 1 or not spelt(without_number(own)[0])
-            if by is None and told and spelt(of_one):
+            if said is not None and by is None and told and spelt(of_one):
                 by = 1.0  # `Grad`, which is no listed unit; or m, of which one is 1250 percent
                 words.setdefault((own, called[own], said), []).append(name)
             elif said not in (None, own):
