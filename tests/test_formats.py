@@ -74,6 +74,9 @@ def test_a_computed_error_may_be_as_large_as_the_goal_is_far():
     ):
         with pytest.raises(InvalidFeedbackError, match=why):
             as_bare_error(typed, goal, form)
+    shown = [[0.3, -2.0, 0.1], [0.0, -5.5, 0.0]]
+    computed = [-4.9427512, 9.0870445, 0.1]
+    np.testing.assert_array_equal(as_bare_error(computed, goal, form, shown=shown), computed)
     outcome = goal + np.array([0.0123456, -0.0345678, 0.01])
     with pytest.raises(InvalidFeedbackError, match="looks like where the object ended"):
         as_bare_error(outcome, goal, form)

@@ -27,7 +27,7 @@ _FAR = 10.0
 taken for an outcome, or an outcome for an error, where that would be four times nearer."""
 _TYPED = 3
 """Digits behind the point that people type at most (ours). Longer numbers were computed, in the
-unit that is asked for: they may be twice as large as the goal's."""
+unit that is asked for: they may be twice as large as the goal's and those of what was shown."""
 
 
 @dataclass(frozen=True)
@@ -160,6 +160,7 @@ def as_bare_error(
     *,
     landed: bool = False,
     expected: ArrayLike = 0.0,
+    shown: ArrayLike = 0.0,
 ) -> Point:
     """Return outcome minus goal in the outcome's units, which nobody stated, as a fresh array.
 
@@ -181,8 +182,12 @@ def as_bare_error(
         )
     if not np.array_equal(array, array.round(_TYPED)):
         of_unit = np.equal.outer(form.units, form.units)
-        doubted &= ~(np.abs(error) <= 2.0 * np.max(of_unit * np.abs(goal), axis=1))
+        largest = np.maximum(np.abs(goal), np.abs(np.atleast_2d(shown)).max(axis=0))
+        doubted &= ~(np.abs(error) <= 2.0 * np.max(of_unit * largest, axis=1))
     if slip := form.slip(np.where(doubted, error, 0.0), error=True):
         what = "where it ended" if landed else "outcome minus goal"
-        raise InvalidFeedbackError(f"an error in {slip} ({what}), or words with their unit")
+        raise InvalidFeedbackError(
+            f"an error in {slip} ({what}), or words with their unit "
+            "(in Python a pr.Reading, as pr.Reading.measured)"
+        )
     return error

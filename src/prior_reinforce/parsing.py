@@ -167,10 +167,11 @@ def as_reading(
     goal: Point,
     form: OutcomeFormat,
     expected: ArrayLike = 0.0,
+    shown: ArrayLike = 0.0,
 ) -> Reading:
     """Return what was seen of a trial as a reading; arguments and errors as in `Session.tell`.
 
-    `expected` as for `as_bare_error`.
+    `expected` and `shown` as for `as_bare_error`.
     """
     if not (hit is None or isinstance(hit, (bool, np.bool_))):
         raise InvalidFeedbackError(f"hit must be True, False or None, got {hit!r}")
@@ -185,7 +186,7 @@ def as_reading(
         reading = seen
     else:
         reading = Reading.estimated(
-            as_bare_error(seen, goal, form, expected=expected), form.least_sd
+            as_bare_error(seen, goal, form, expected=expected, shown=shown), form.least_sd
         )
     if reading.said and None not in (hit, reading.hit) and reading.hit != hit:
         beside = "hit" if hit else "miss"

@@ -241,9 +241,8 @@ class Session:
         Args:
             number: The open trial's number.
             seen: What perception returned; or words, `5 cm long, 2 cm left`, `20 ms late` (see
-                `from_words`); or outcome minus goal as a number of unknown origin,
-                shape (k,), in the outcomes' units (see `Reading.estimated`). None where nothing
-                but `hit` is known.
+                `from_words`); or outcome minus goal as a number of unknown origin, shape (k,), in
+                the outcomes' units (see `Reading.estimated`). None: nothing but `hit` is known.
             hit: Whether the goal was reached, where that is seen directly (the ball is in the
                 hoop). None leaves it to `seen`; where that does not know, it is judged by the
                 perceived error, as Algorithm 1 does.
@@ -348,7 +347,8 @@ class Session:
         seen: Reading | ArrayLike | None,
         hit: bool | None,
     ) -> None:
-        reading = as_reading(seen, hit, goal.goal, goal.format, trial.expected.large_error)
+        expected, shown = trial.expected.large_error, self.demonstrations.outcomes_seen
+        reading = as_reading(seen, hit, goal.goal, goal.format, expected, shown)
         # Where a component is open, nobody knows.
         near = goal.is_hit(reading.error_seen) and np.isfinite(reading.spread).all()
         reached = near if reading.hit is None else reading.hit
