@@ -51,6 +51,10 @@ def test_a_turn_is_found_where_all_begin_at_one_pose():
     assert found.moves[1] == TurnJoint(0, 1.0)
 
 
+def test_a_hand_off_the_axis_by_a_twentieth_is_no_base_elsewhere():
+    assert find_turn(throws(8, centre=(0.05, 0.0))) is not None
+
+
 def pushes(*, slope=1.0, names=("dx", "dy", "dyaw"), units=("m", "m", "rad"), ahead=0.0):
     """Straight pushes with increments that head where the object is to go."""
     rng = np.random.default_rng(0)
@@ -105,11 +109,12 @@ def test_throws_may_go_anywhere_about_the_base(ahead):
         throws(off=0.2),  # a joint that goes where it likes
         throws(8, slope=0.4),  # a push, for which the arm turns less
         throws(8, centre=(-0.8, 0.0)),  # an axis far behind the base
+        throws(8, centre=(0.15, 0.1)),  # outcomes that are not seen from the base
         throws(form=replace(FORM, names=("dx", "dy", "dyaw"), units=("m", "m", "rad"))),
         throws(form=replace(FORM, names=("x", "y", "yaw"), units=("m", "m", "rad"))),
         throws(form=replace(FORM, units=("1", "1", "1"))),
     ],
-    ids=["few", "noise", "slope", "far", "increments", "poses", "no angles"],
+    ids=["few", "noise", "slope", "far", "elsewhere", "increments", "poses", "no angles"],
 )
 def test_other_demonstrations_show_none(demonstrations):
     assert find_turn(demonstrations) is None

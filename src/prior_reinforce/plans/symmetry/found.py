@@ -31,6 +31,9 @@ _APART = 0.04
 """Standard deviation of directions at least, in [rad]."""
 _UNEXPLAINED = 0.2
 """What bearings may be off, of the standard deviation of directions."""
+_BY_CHANCE, _NEAR = 0.01, 0.1
+"""Where an axis elsewhere explains bearings so much better that it is less probably by chance, and
+it is farther off than such a share of the outcomes' mean distance, none is found."""
 
 
 def find_turn(demonstrations: Demonstrations) -> Symmetry | None:
@@ -49,6 +52,8 @@ def find_turn(demonstrations: Demonstrations) -> Symmetry | None:
     ):
         apart = _spread(directions)
         if apart > _APART and _spread(bearing - directions) <= _UNEXPLAINED * apart:
+            if _axis_elsewhere(directions, outcomes[:, :2]):
+                return None
             found = symmetry.around(outcomes)
             anchors = Anchors(found, outcomes, demonstrations.outcome_noise)
             return found if anchors.mixed else None
@@ -75,6 +80,27 @@ def _turns(
         (turn_and_scale(TurnJoint(joint, way), (0.0, 0.0), Learned(), others), way * angle)
         for way in (1.0, -1.0)  # as the joint counts
     ]
+
+
+def _axis_elsewhere(directions: Float[np.ndarray, " N"], places: Float[np.ndarray, "N 2"]) -> bool:
+    """Whether directions are bearings about an axis that is clearly not the origin.
+
+    By an F test of the axis that is fitted: 2 parameters more, and N - 3 degrees of freedom left.
+    """
+    from scipy.optimize import least_squares
+
+    size = float(np.linalg.norm(places, axis=1).mean())
+
+    def off(axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, " N"]:
+        x, y = (places / size - axis[:2]).T
+        return np.angle(np.exp(1j * (np.arctan2(y, x) - directions - axis[2])))
+
+    first = float(np.angle(np.exp(1j * off(np.zeros(3))).mean()))
+    there = np.array([0.0, 0.0, first])
+    fitted = least_squares(off, there)
+    ratio = 2.0 * float(fitted.cost) / float(np.square(off(there)).sum())
+    by_chance = ratio ** ((len(places) - 3) / 2)
+    return bool(by_chance < _BY_CHANCE and np.linalg.norm(fitted.x[:2]) > _NEAR)
 
 
 def _spread(angles: Float[np.ndarray, " N"]) -> float:
