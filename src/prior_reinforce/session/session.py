@@ -272,11 +272,10 @@ class Session:
 
         An open trial keeps the plan it has, and says so (`Trial.outdated`).
 
-        Arguments as in `tell`.
+        Arguments, and errors of what was seen, as in `tell`.
 
         Raises:
             TrialStateError: There is no such trial, or it has not been told.
-            InvalidFeedbackError: As in `tell`.
         """
         with self._exclusive() as state:
             trial = state.trial(number)
@@ -347,8 +346,9 @@ class Session:
         seen: Reading | ArrayLike | None,
         hit: bool | None,
     ) -> None:
-        expected, shown = trial.expected.large_error, self.demonstrations.outcomes_seen
-        reading = as_reading(seen, hit, goal.goal, goal.format, expected, shown)
+        bare = not isinstance(seen, Reading | str | None)  # else nothing has to be loaded
+        shown = self.demonstrations.outcomes_seen if bare else 0.0
+        reading = as_reading(seen, hit, goal.goal, goal.format, trial.expected.large_error, shown)
         # Where a component is open, nobody knows.
         near = goal.is_hit(reading.error_seen) and np.isfinite(reading.spread).all()
         reached = near if reading.hit is None else reading.hit
