@@ -165,7 +165,8 @@ def as_bare_error(
     """Return outcome minus goal in the outcome's units, which nobody stated, as a fresh array.
 
     `told` is the error; or, if `landed`, the outcome was asked for. An error as large as
-    `expected`, (k,), is not doubted. InvalidFeedbackError for a wrong shape, what is not finite,
+    `expected`, (k,), is not doubted, nor a computed one twice as large as the goal or the outcomes
+    that were `shown`, (N, k). InvalidFeedbackError for a wrong shape, what is not finite,
     another unit by its size, or an outcome in place of an error, or the other way round.
     """
     array = as_error(told, form.outcome_dim)

@@ -86,8 +86,10 @@ def test_increments_that_head_where_the_object_goes_are_a_turn_about_the_origin(
         pushes(slope=0.4),
         pushes(names=("dx", "dz", "dyaw")),
         pushes(names=("dx", "dy", "drx")),  # which a turn would leave behind
+        throws(form=replace(FORM, names=("delta_base", "delta_lift", "grip"))),
+        pushes(names=("x", "y", "delta_grip"), units=("m", "m", "1")),  # poses
     ],
-    ids=["slope", "height", "attitude"],
+    ids=["slope", "height", "attitude", "joints", "poses"],
 )
 def test_other_increments_show_none(shown):
     assert find_turn(shown) is None

@@ -21,7 +21,7 @@ from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.symmetry.anchors import Anchors
 from prior_reinforce.plans.symmetry.declared import declare_symmetry
-from prior_reinforce.plans.symmetry.moves import Learned, TurnJoint
+from prior_reinforce.plans.symmetry.moves import Learned, TurnIncrements, TurnJoint
 from prior_reinforce.plans.symmetry.symmetry import Symmetry, turn_and_scale
 from prior_reinforce.units import kind_of
 
@@ -66,10 +66,13 @@ def _turns(
     """Turns that plans may show, each with the direction of every plan, [rad]."""
     if form.increments:
         with suppress(ConfigurationError):  # of other columns than can be turned
-            turn = declare_symmetry(form, k, about="base", distance="learned")
-            steps = plans[:, :, [form.names.index(name) for name in ("dx", "dy")]]
-            headed = np.einsum("nhi,nh->ni", steps, np.square(steps).sum(axis=2))
-            return [(turn, np.arctan2(headed[:, 1], headed[:, 0]))]
+            symmetry = declare_symmetry(form, k, about="base", distance="learned")
+            turn = symmetry.moves[1]
+            if isinstance(turn, TurnIncrements):
+                steps = plans[:, :, turn.place]
+                headed = np.einsum("nhi,nh->ni", steps, np.square(steps).sum(axis=2))
+                return [(symmetry, np.arctan2(headed[:, 1], headed[:, 0]))]
+        return []
     if any(kind_of(unit) == "length" for unit in form.units) or "rad" not in form.units:
         return []
     joint = form.units.index("rad")
