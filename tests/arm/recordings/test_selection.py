@@ -50,6 +50,23 @@ def test_what_was_written_for_failed_reads_is_no_unit_and_no_turn(fill):
     assert select([replace(told, positions=q)]).recordings[0].positions.max() == 1.0
 
 
+@pytest.mark.parametrize(
+    ("names", "value"),
+    [
+        (("dx", "dy"), 0.04),  # a strike at a few frames a second
+        (("vx", "vy"), 0.8),
+        (("j1", "elbow"), 0.3),  # a held joint that is moved for a moment, within what j1 moves
+    ],
+)
+def test_a_motion_that_is_large_in_a_few_frames_is_no_failed_read(names, value):
+    (told,) = takes(names, [0.3, 1.2])
+    q = told.positions.copy()
+    q[:, 1] = 0.001
+    q[40:43, 1] = value
+    picked = select([replace(told, positions=q)]).recordings[0].positions
+    np.testing.assert_allclose(picked / picked.max(axis=0), q / q.max(axis=0))
+
+
 def test_what_is_lost_in_a_channel_that_is_not_taken_does_not_count():
     q = np.column_stack([np.sin(T), np.full(100, np.nan)])
     selection = select([Recording("throw", T, q, ("a", "b"))], joints=["a"])

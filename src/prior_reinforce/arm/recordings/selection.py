@@ -22,15 +22,24 @@ from prior_reinforce.arm.recordings.recording import Recording, or_leave_out
 from prior_reinforce.arm.recordings.takes import in_one_unit, odd_takes
 from prior_reinforce.arm.recordings.units import Ambiguity, conversion, say_names, split_unit
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
-from prior_reinforce.plans.channels import Kind, kinds, measured_of, one_for_all, says_no_position
+from prior_reinforce.plans.channels import (
+    RATES,
+    Kind,
+    is_increment,
+    kinds,
+    measured_of,
+    one_for_all,
+    says_no_position,
+)
 from prior_reinforce.plans.whole_turns import TURN
 from prior_reinforce.wording import listed
 
 _MOST_LOST = 0.1
 """Share of an episode's frames that may be lost. Ours: lost packets come in bursts of some frames;
 where more is missing, the recorder failed."""
-_FAR = 5.0
-"""Times as far as in all other frames that a few cannot be. Ours: -999 for what was not read."""
+_BEYOND = 5.0
+"""A few frames that are so many times as large as all others were not read. Ours: a motion passes
+through what lies between."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +184,10 @@ def _refuse_places(
     turning = [(j, n, kind) for j, n, kind, unit in each if unit in TURN]
     places = [(j, n) for j, n, kind in turning if kind is Kind.PLACE]
     rates = [(j, n) for j, n, _ in turning if says_no_position(j) and n not in no_joint]
-    for wrong, are in ((places, "are a place"), (rates, "look like velocities, torques or else")):
+    for wrong, are in (
+        (places, "are a place"),
+        (rates, "look like velocities, torques or the like"),
+    ):
         if wrong:
             recorded, called = zip(*wrong, strict=True)
             raise ConfigurationError(
@@ -257,7 +269,9 @@ def _columns(
             there += f": {say_names(tool)} look like the pose of a tool"
             by_key = f" {shlex.join(tool)}{by_key}"
         elif rates and len(recording.names) - len(rates) < len(joints):
-            there += f": {say_names(rates)} look like velocities, torques or else, and positions "
+            there += (
+                f": {say_names(rates)} look like velocities, torques or the like, and positions "
+            )
             there += "are missing; record them, or if another column holds them"
         beside = list(recording.beside)
         for joint in missing_channels(joints, recording.names):
@@ -277,6 +291,35 @@ def _columns(
     return find_channels(names, joints) or list(range(len(joints)))
 
 
+def _refuse_failed_reads(
+    episode: str, called: Sequence[str], positions: np.ndarray, joints: Sequence[str]
+) -> None:
+    """Refuse what a recorder writes in a few frames where it read nothing, such as -999.
+
+    It is far beyond all other frames, and beyond those of all channels of its kind. Tools switch,
+    and increments and speeds are large in a few frames alone: these are not judged.
+    """
+    size, of_kind = np.abs(positions), kinds(joints)
+    if not len(size):
+        return
+    most = size.max(axis=0)
+    rest = np.where(size <= most / 2, size, 0.0).max(axis=0)
+    usual = np.where(_BEYOND * rest < most, rest, most)
+    for i, kind in enumerate(of_kind):
+        if kind in (Kind.TOOL, *RATES) or is_increment(joints[i]):
+            continue
+        far = np.flatnonzero(size[:, i] > most[i] / 2)
+        few = len(far) < _MOST_LOST * len(size) and not {0, len(size) - 1} & {*far.tolist()}
+        alike = max(usual[j] for j, other in enumerate(of_kind) if other is kind)
+        if few and most[i] > alike and 0 < _BEYOND * rest[i] < most[i]:
+            raise InvalidDemonstrationsError(
+                f"episode {episode}: {called[i]} is {positions[far[0], i]:.4g} in {len(far)} of "
+                f"{len(size)} frames, first in {far[0]}, and {rest[i]:.4g} at most in all others, "
+                "as where a read failed: write nan there, so that they are left out as lost frames "
+                "are, or leave that episode out (--leave-out)"
+            )
+
+
 def _picked(recording: Recording, columns: list[int], joints: tuple[str, ...]) -> Recording:
     """Some channels, without the few frames in which one of them is not finite."""
     positions, remarks = recording.positions[:, columns], recording.remarks
@@ -293,17 +336,7 @@ def _picked(recording: Recording, columns: list[int], joints: tuple[str, ...]) -
             )
         count = "frame is" if lost.sum() == 1 else "frames are"
         remarks += (f"{what}; {lost.sum()} {count} left out, as lost packets are",)
-    size, of_kind = np.abs(positions[~lost]), kinds(joints)
-    for i, most in enumerate(size.max(axis=0, initial=0.0)):
-        far, rest = np.flatnonzero(size[:, i] > most / 2), size[size[:, i] <= most / 2, i]
-        back = 0 < len(far) < _MOST_LOST * len(size) and not {0, len(size) - 1} & {*far.tolist()}
-        if back and of_kind[i] is not Kind.TOOL and 0 < _FAR * rest.max() < most:  # and no switch
-            raise InvalidDemonstrationsError(
-                f"episode {recording.episode}: {called[i]} is {positions[~lost][far[0], i]:.4g} in "
-                f"{len(far)} of {len(size)} frames, first in {far[0]}, and {rest.max():.4g} at "
-                "most in all others, as where a read failed: write nan there, so that they are "
-                "left out as lost frames are, or leave that episode out (--leave-out)"
-            )
+    _refuse_failed_reads(recording.episode, called, positions[~lost], joints)
     units = zip(recording.columns, recording.units, strict=True)
     names = [name + (f" [{unit}]" if unit else "") for name, unit in units]
     beside = columns_beside(names, recording.positions, columns, recording.times)
