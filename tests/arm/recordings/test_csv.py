@@ -337,6 +337,7 @@ def test_a_json_beside_a_table_without_heads_names_its_columns(tmp_path, json_na
         ("% angle unit = °", ("deg", "deg", None, "rad")),
         ("#units,s,deg,deg,mm,rad", (None,) * 3 + ("rad",)),  # two
         ("# recorded without deg to rad", (None,) * 3 + ("rad",)),
+        ("# outcome units: deg", (None,) * 3 + ("rad",)),
         ("# release angle [deg]: 30", (None,) * 3 + ("rad",)),
         ({"angle_unit": "deg"}, ("deg", "deg", None, "rad")),
         ({"units": {"angle": "deg", "time": "ms"}}, ("deg", "deg", None, "rad")),

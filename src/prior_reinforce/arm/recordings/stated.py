@@ -189,12 +189,12 @@ def recorded_among(
 
 
 def _refuse_rates(where: str, key: str, joints: Sequence[str]) -> None:
-    """FileFormatError if joints are to be what is called velocities, torques or else."""
+    """FileFormatError if joints are to be what is called velocities, torques or the like."""
     own = _STEMS.split(key)[-1]
     of_plan = Kind.ANGLE in kinds(joints) and not any(map(says_no_position, joints))
     if of_plan and says_no_position(own) and not is_of_pose(own):
         raise FileFormatError(
-            f"{where}: {key} looks like velocities, torques or else, and not the positions of "
+            f"{where}: {key} looks like velocities, torques or the like, and not the positions of "
             f"{say_names(joints)}: name what holds those with --key, or record them; if it holds "
             "them, rename it"
         )
@@ -348,7 +348,8 @@ def headed(table: Table, joints: Sequence[str] | None = None) -> Table:
         return table
     check_names(where, names)
     texts = {f".{key}": own for key, own in texts.items()}
-    said = [one["units"] for line in table.comments for one in _UNIT_OF_ALL.finditer(line)]
+    of_motion = [line for line in table.comments if not _OUTCOME.fullmatch(line)]
+    said = [one["units"] for line in of_motion for one in _UNIT_OF_ALL.finditer(line)]
     angles = {
         unit for unit in map(known_unit, re.split(r"[\s,;]+", " ".join(said))) if unit in TURN
     }
