@@ -10,6 +10,7 @@ from prior_reinforce.arrays import (
     as_plans,
     check_spread,
     is_positive,
+    say_flat,
 )
 from prior_reinforce.errors import (
     InvalidDemonstrationsError,
@@ -69,6 +70,32 @@ def test_outcomes_on_a_line_are_found_at_any_scale(scale):
     bent = line.copy()
     bent[2, 1] *= 1.1
     check_spread(bent)
+
+
+@pytest.mark.parametrize(("off", "flat"), [(0.0, True), (0.05, True), (0.4, False)])
+@pytest.mark.parametrize("scale", [1.0, 1e-3, 1e3])
+def test_outcomes_that_are_almost_on_a_line_are_told_whatever_their_units(off, flat, scale):
+    along = np.arange(4.0)
+    outcomes = np.column_stack([along, scale * (along + off * np.array([1, -1, -1, 1]))])
+    assert ("almost on one line" in say_flat(outcomes)) is flat
+    assert bool(say_flat(outcomes)) is flat
+
+
+def test_two_outcomes_of_two_components_are_on_a_line_and_one_tells_nothing():
+    assert "one line" in say_flat(np.array([[0.1, 0.2], [0.3, 0.1]]))
+    assert "one plane" in say_flat(np.eye(3))
+    assert say_flat(np.array([[0.1], [0.3]])) == say_flat(np.array([[0.1, 0.2]])) == ""
+
+
+def test_one_number_is_a_vector_of_one():
+    np.testing.assert_array_equal(as_goal(1.2, ["x"]), [1.2])
+    np.testing.assert_array_equal(as_error(np.float32(0.5), 1), [0.5])
+    np.testing.assert_array_equal(as_outcomes([0.4, 0.5, 0.7], 3), [[0.4], [0.5], [0.7]])
+    for numbers, n in (([0.4, 0.5], 3), (0.4, 1), ([[0.4], [0.5, 0.6]], 2)):
+        with pytest.raises(InvalidDemonstrationsError, match="shape|of numbers"):
+            as_outcomes(numbers, n)
+    with pytest.raises(InvalidGoalError, match="2 components"):
+        as_goal(1.2, ["x", "y"])
 
 
 @pytest.mark.parametrize("value", [0, -1.0, np.nan, np.inf, None, "1", True, [1.0]])

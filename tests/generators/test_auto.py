@@ -1,6 +1,8 @@
 """What demonstrations ask for: said, kept, and exact at the demonstrations."""
 
+import warnings
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +14,8 @@ from prior_reinforce.generators.network.diffusion import DiffusionGenerator
 from prior_reinforce.generators.timing.registration import Motions
 from prior_reinforce.plans import motions
 from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.plan_format import PlanFormat
+from prior_reinforce.plans.symmetry import declare_symmetry
 from prior_reinforce.simulation.tasks import make_task
 from tests.generators.test_patterns import throws
 
@@ -46,6 +50,22 @@ def test_a_large_pattern_with_outcomes_on_a_line_goes_to_diffusion_with_the_rest
     monkeypatch.setattr(DiffusionGenerator, "_fit", lambda *a: None)
     made = Auto().fit(Demonstrations(plans[:8], outcomes[:8], demos.format), seed=0)
     assert made.remarks[0].startswith("generator: diffusion")
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_outcomes_almost_on_a_line_are_warned_of_where_no_symmetry_tells_the_rest(n):
+    shown = throws((1,) * 6).only(range(3))
+    along = np.array([0.0, 0.1, 0.2])
+    outcomes = np.column_stack([0.8 + along, 0.1 + along + [0.0, 0.001, 0.0]])[:n]
+    demos = Demonstrations(shown.plans[:n], outcomes, shown.format)
+    with pytest.warns(UserWarning, match="demonstrate one well beside it") as warned:
+        make_generator("auto").fit(demos, seed=0)
+    assert [each.filename for each in warned] == [__file__]
+    form = PlanFormat(("x", "y"), ("m", "m"), 0.02)
+    turned = replace(demos, format=form, symmetry=declare_symmetry(form, 2, about="base"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        make_generator("auto").fit(turned, seed=0)
 
 
 def test_what_it_chooses_itself_is_not_set():

@@ -90,7 +90,8 @@ class GaussianProcessAdapter(Adapter):
 
     Outside, the correction seen in trials fades over a length scale, and beyond several of them a
     condition returns to the demonstrations' mean, which is the prior: goals there need
-    demonstrations, not trials.
+    demonstrations, not trials. An offset that is the same everywhere (a moved table) is not in this
+    prior either: a trial corrects near its own outcome only, and a far miss may be asked for again.
 
     After `start` and every `observe`, what was fitted can be read as in scikit-learn:
     `GaussianProcessRegressor(ConstantKernel() * RBF(), alpha=jitter_).fit(memory_outcomes_,
