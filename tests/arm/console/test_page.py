@@ -1,6 +1,6 @@
 """The page in a real browser, at a console: a program of its own where it is to be killed.
 
-With PRIOR_REINFORCE_SCREENSHOTS=docs/images/console it writes the documentation's pictures.
+With PRIOR_REINFORCE_SCREENSHOTS=docs/images/console it writes the pictures there anew.
 """
 
 from __future__ import annotations
@@ -129,10 +129,11 @@ def touch(page: Page, place, svg="map"):
 
 
 def shot(page: Page, name: str, tmp_path: Path):
-    folder = Path(os.environ.get("PRIOR_REINFORCE_SCREENSHOTS", tmp_path))
-    if folder != tmp_path:
+    shown = Path(os.environ.get("PRIOR_REINFORCE_SCREENSHOTS", tmp_path)) / f"{name}.png"
+    if shown.exists():  # in the documentation
         page.wait_for_timeout(1200)  # what moves the arm cannot be pressed at once
-    page.screenshot(path=folder / f"{name}.png")
+        page.screenshot(path=shown)
+    page.screenshot(path=tmp_path / f"{name}.png")
 
 
 def accessible(page: Page):
