@@ -92,7 +92,7 @@ def test_one_number_is_a_vector_of_one():
     np.testing.assert_array_equal(as_error(np.float32(0.5), 1), [0.5])
     np.testing.assert_array_equal(as_outcomes([0.4, 0.5, 0.7], 3), [[0.4], [0.5], [0.7]])
     for numbers, n in (([0.4, 0.5], 3), (0.4, 1), ([[0.4], [0.5, 0.6]], 2)):
-        with pytest.raises(InvalidDemonstrationsError, match="shape|of numbers"):
+        with pytest.raises(InvalidDemonstrationsError, match=r"shape|of numbers"):
             as_outcomes(numbers, n)
     with pytest.raises(InvalidGoalError, match="2 components"):
         as_goal(1.2, ["x", "y"])
