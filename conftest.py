@@ -1,4 +1,4 @@
-"""What holds for all tests: arrays have the shapes they are annotated with, and one thread each."""
+"""What holds for all tests: arrays have their annotated shapes, one thread each, no deadlines."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
+import hypothesis
 import pytest
 from threadpoolctl import threadpool_limits
 
@@ -25,6 +26,9 @@ check_shapes("simulators")
 # Threads that wait for each other by spinning crawl on a busy machine; two test processes are one.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("MUJOCO_GL", "egl")
+# How long something takes decides no test.
+hypothesis.settings.register_profile("no deadline", deadline=None)
+hypothesis.settings.load_profile("no deadline")
 # Programs that tests start find the tests' own classes, and the package where the tests do.
 here = (str(Path(__file__).parent), os.environ.get("PYTHONPATH"))
 os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, here))

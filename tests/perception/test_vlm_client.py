@@ -280,9 +280,7 @@ choices = st.fixed_dictionaries(
 replies = st.fixed_dictionaries({}, optional={"choices": st.lists(choices | anything) | anything})
 
 
-@settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.one_of(replies, anything, st.binary(max_size=30)))
 def test_any_reply_is_an_answer_or_a_failed_reading(reply):
     content = reply if isinstance(reply, bytes) else json.dumps(reply).encode()

@@ -151,7 +151,7 @@ def test_a_number_is_never_read_from_its_middle():
 
 
 @pytest.mark.slow
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.text(alphabet="[](){}<>,.-0123456789 |abox_nd", max_size=300))
 def test_any_text_is_a_box_in_the_picture_or_unreadable(text):
     try:

@@ -67,7 +67,7 @@ def test_a_time_step_that_no_binary_fraction_holds_adds_no_sample():
 
 
 @pytest.mark.slow
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(2, 40), st.floats(0.002, 0.1), st.integers(0, 2**32 - 1))
 def test_interpolation_is_linear_in_the_frames(horizon, dt, seed):
     frames = np.random.default_rng(seed).normal(size=(horizon, 2))

@@ -238,9 +238,7 @@ def test_whatever_is_asked_the_answer_is_a_documented_one(served, operations):
         if operation.path == "/api/stop":
             continue  # nothing is executing; what it does is in test_verbs
 
-        @settings(
-            max_examples=12, deadline=None, suppress_health_check=list(HealthCheck), database=None
-        )
+        @settings(max_examples=12, suppress_health_check=list(HealthCheck), database=None)
         @given(case=operation.as_strategy())
         def answered(case):
             case.validate_response(case.call(headers=headers), checks=CHECKS)
@@ -249,7 +247,7 @@ def test_whatever_is_asked_the_answer_is_a_documented_one(served, operations):
     assert served.process.poll() is None
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+@settings(max_examples=60, suppress_health_check=list(HealthCheck), database=None)
 @given(
     method=st.sampled_from(["GET", "POST", "PUT", "DELETE", "PATCH"]),
     path=st.text(st.characters(min_codepoint=33, max_codepoint=126), max_size=30),

@@ -398,7 +398,7 @@ def test_a_tiny_time_step_is_refused_before_it_fills_the_memory():
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.integers(0, 2**32 - 1),
     st.floats(0.02, 0.08),

@@ -313,7 +313,7 @@ def test_a_joint_resting_at_a_stop_breaks_no_velocity_bound():
 
 
 @pytest.mark.slow
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1))
 def test_a_plan_passes_exactly_when_looser_limits_of_its_own_peaks_hold(seed):
     """Limits a hair above the plan's own peaks pass; a hair below any of them is refused."""

@@ -195,7 +195,7 @@ def test_missing_plan(tmp_path):
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(cut=st.booleans(), where=st.floats(0, 1, exclude_max=True), bit=st.integers(0, 7))
 def test_damaged_files_are_named_errors_or_noticed_by_the_hash(cut, where, bit, tmp_path_factory):
     frames = np.cumsum(np.ones((20, 2)), axis=0)

@@ -255,9 +255,7 @@ def test_a_missing_file_and_one_that_is_no_toml_are_named(tmp_path):
 
 
 @pytest.mark.slow
-@settings(
-    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.integers(0, 2000), st.binary(max_size=3))
 def test_no_damage_causes_anything_but_a_named_error(tmp_path, position, junk):
     whole = manifest().encode()
