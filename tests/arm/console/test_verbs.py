@@ -359,7 +359,7 @@ def test_an_arm_says_where_it_stands_and_a_person_is_asked_what_the_command_line
         "Trial 1 will run at FULL SPEED (0.5 s). NOT checked: self-collision, the table. "
         "Is the area clear?"
     )
-    assert asked.arm == "toy, firmware 1.0: the arm is 3.24e-05 rad (joint1) from the start pose"
+    assert asked.arm == "toy, firmware 1.0: the arm is 0 rad (joint1) from the start pose"
     assert (asked.motion, asked.refused, toy_arm.motions(arm)) == ("trial", "", 0)
     slow = verbs.question(execution(state, motion="rehearsal", speed=0.2))
     assert slow.question.startswith("Trial 1 will be rehearsed at 20 % of its speed (2.3 s). NOT")

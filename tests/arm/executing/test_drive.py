@@ -376,6 +376,7 @@ OF_UNITS = PlanFormat(("joint1", "rail", "gripper", "valve"), UNITS, 0.01)
             "90 steps (valve), which is held against nothing",
             False,
         ),
+        ((2.6e-17, 3e-5, 0.0, 2.6e-17), "0 rad (joint1), 0 m (rail), 0 percent", True),
         (
             (float("nan"), 0.005, 0.1, 0),
             "inf rad (joint1); 0.02 is allowed",

@@ -208,10 +208,11 @@ def say_distance(
     said, there = [], True
     for unit, (distance, name) in worst.items():
         allowed = settings.errors_of(unit)
-        text = f"{distance:.3g} {unit} ({name}) from the start pose"
+        seen = round(distance, 4)  # what is less is a rounding error or an encoder's noise
+        text = f"{seen:.3g} {unit} ({name}) from the start pose"
         if allowed is None:
             text += f", which is held against nothing: add {unit} to errors in [gate]"
-            there = there and distance == 0
+            there = there and seen == 0
         elif distance > allowed[0]:
             text, there = f"{text}; {allowed[0]:g} is allowed", False
         said.append(text)
