@@ -379,8 +379,17 @@ def test_episodes_that_rest_at_one_pose_first_are_no_chunks(tmp_path):
 
 
 @pytest.mark.parametrize("start", [np.datetime64("2024-01-01"), np.timedelta64(0, "us")])
-def test_dates_and_spans_are_times(tmp_path, start):
+def test_dates_and_spans_are_times_whose_unit_nobody_is_asked_for(tmp_path, start):
     stamps = start + (np.arange(101) * 20_000).astype("timedelta64[us]")
-    np.savez(tmp_path / "throw_0.npz", q=Q, timestamps=stamps)
-    (read,) = read_recordings(tmp_path, take_guesses=True)
-    np.testing.assert_allclose(read.times, np.arange(101) / 50, atol=1e-6)
+    log = np.zeros(101, dtype=[("stamp", stamps.dtype), ("q", float, 2)])
+    log["stamp"], log["q"] = stamps, Q
+    for arrays in ({"q": Q, "timestamps": stamps}, {"log": log}):
+        np.testing.assert_allclose(
+            read_one(tmp_path, **arrays).times, np.arange(101) / 50, atol=1e-6
+        )
+    np.save(tmp_path / "throw.npy", log)
+    assert read_recordings(tmp_path / "throw.npy")[0].period == pytest.approx(0.02)
+    assert read_one(tmp_path, q=Q, dt=np.timedelta64(20, "ms")).period == pytest.approx(0.02)
+    stamps[5] = "NaT"
+    with pytest.raises(InvalidDemonstrationsError, match=r"nan.* frame 5"):
+        read_one(tmp_path, q=Q, timestamps=stamps)

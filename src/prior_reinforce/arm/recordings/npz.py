@@ -46,7 +46,8 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         if len(paths) > 1 and options.leaves_out(path.stem):
             yield path.stem, unread
         else:
-            yield from _each(path, _arrays(path), options)
+            arrays = {name: _seconds(own) for name, own in by_field(_arrays(path)).items()}
+            yield from _each(path, arrays, options)
 
 
 def _each(path: Path, arrays: Arrays, options: ReadOptions) -> Episodes:
@@ -118,10 +119,10 @@ def _arrays(path: Path) -> Arrays:
     if path.suffix.lower() == ".npy":
         check_bytes(path, path.stat().st_size)
         with named_damage(path, "NPY with plain numbers"), path.open("rb") as file:
-            return by_field({_MOTION_KEYS[0]: np.load(file, allow_pickle=False)})
+            return {_MOTION_KEYS[0]: np.load(file, allow_pickle=False)}
     remedy = "it must be an NPZ with plain number arrays; copy it again, or say its format"
     with open_npz(path, remedy, MOST_BYTES) as archive:
-        content = {name: _as_numbers(np.asarray(archive[name])) for name in archive.files}
+        content = {name: np.asarray(archive[name]) for name in archive.files}
         said: Any = {}
         with contextlib.suppress(ValueError, KeyError):
             said = json.loads(str(content["metadata"]))
@@ -131,10 +132,11 @@ def _arrays(path: Path) -> Arrays:
             content.setdefault("dt", np.array(float(form["dt"])))
             content.setdefault("names", np.array(form.get("names") or form.get("joint_names")))
             del content["metadata"]
-        return by_field(content)
+        return content
 
 
-def _as_numbers(array: np.ndarray) -> np.ndarray:
-    """Dates and times as numbers of [ns]; other arrays as they are."""
-    kind = array.dtype.kind
-    return array.astype(f"{kind}8[ns]").astype(np.int64) if kind in "mM" else array
+def _seconds(array: np.ndarray) -> np.ndarray:
+    """Dates and times as numbers of [s], nan where one is missing; other arrays as they are."""
+    if array.dtype.kind == "M":
+        array = array - np.datetime64(0, "s")
+    return array / np.timedelta64(1, "s") if array.dtype.kind == "m" else array
