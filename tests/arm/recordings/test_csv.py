@@ -339,10 +339,18 @@ def test_a_json_beside_a_table_without_heads_names_its_columns(tmp_path, json_na
         ("# recorded without deg to rad", (None,) * 3 + ("rad",)),
         ("# outcome units: deg", (None,) * 3 + ("rad",)),
         ("# release angle [deg]: 30", (None,) * 3 + ("rad",)),
+        ("# angle [deg]: 30", (None,) * 3 + ("rad",)),
+        ("# Euler angles in deg", (None,) * 3 + ("rad",)),
+        ("# units of camera: deg, gripper angle in deg", (None,) * 3 + ("rad",)),
+        ("# Angles are in degrees", ("deg", "deg", None, "rad")),
+        ("# t in s, q in deg", ("deg", "deg", None, "rad")),
+        ("# angle_unit: deg", ("deg", "deg", None, "rad")),
         ({"angle_unit": "deg"}, ("deg", "deg", None, "rad")),
         ({"units": {"angle": "deg", "time": "ms"}}, ("deg", "deg", None, "rad")),
         ({"units": ["deg", "rad", "mm", "deg"]}, ("deg", "rad", "mm", "rad")),
         ({"units": "mm"}, (None,) * 3 + ("rad",)),
+        ({"goal": {"units": "deg"}, "outcome": {"units": "deg"}}, (None,) * 3 + ("rad",)),
+        ({"units": {"joint_positions": "deg"}}, ("deg", "deg", None, "rad")),
     ],
 )
 def test_comments_and_a_json_beside_say_the_units_that_heads_do_not(tmp_path, comment, units):

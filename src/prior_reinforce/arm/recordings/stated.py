@@ -61,15 +61,16 @@ _FRAMES = re.compile(
 )
 _OUTCOME = re.compile(r"(.*[^a-z])?(outcomes?|landings?|landed)([^a-z].*)?", re.IGNORECASE)
 """What an array of where objects landed is called."""
-_JOINTS = r"(joint|angle|angular|position|motion|rotation)s?"
-_UNIT = re.compile(rf"(.*\.)?(({_JOINTS}_?)?units?|units?\.{_JOINTS})", re.IGNORECASE)
+_JOINTS = r"(joint|angle|angular|position|motion|rotation|q)s?"
+_UNIT = re.compile(rf"(.*\.)?(({_JOINTS}_?)*units?|units?\.({_JOINTS}_?)+)", re.IGNORECASE)
 """What the joints' units are called among others, deep in what a file says of itself."""
 _UNIT_OF_ALL = re.compile(
-    r"(?:\b(?:units?( of \w+)?|angles|joints|positions|winkel)\s*(?:[:=]|\bin\b|[\[(])|^[#%/]+)"
-    r"\s*(?P<units>(?:[a-z]+|°)(?:\s*[,;]\s*(?:[a-z]+|°))*)\s*(?:[\])]|$|[,;.](?!\d))",
+    rf"(?:^[#%/]+|[,;.])\W*(?:({_JOINTS}|winkel|units?|values|all|the|of|are|is|given|in)(?![a-z])[\W_]*)*"
+    r"(?P<units>(?:[a-z]+|°)(?:\s*[,;]\s*(?:[a-z]+|°))*)\s*(?:[\])](?!\s*[:=])|$|[,;.](?!\d))",
     re.IGNORECASE,
 )
-"""Words of a comment that are the unit of all: `# angles in deg`, `# units: rad`, `# deg`."""
+"""A part of a comment that is the unit of all and of nothing else: `# joint angles in deg`, `# t in
+s, q in deg`, `# deg`; no `camera angles in deg`, and no `angle [deg]: 30`."""
 _SOUND, _FASTER = 1_000_000, 20
 """Numbers of what moves at another rate than the motion, at most, and how many times the motion's,
 if that is more. Ours: sound has more."""
@@ -349,10 +350,8 @@ def headed(table: Table, joints: Sequence[str] | None = None) -> Table:
     check_names(where, names)
     texts = {f".{key}": own for key, own in texts.items()}
     of_motion = [line for line in table.comments if not _OUTCOME.fullmatch(line)]
-    said = [one["units"] for line in of_motion for one in _UNIT_OF_ALL.finditer(line)]
-    angles = {
-        unit for unit in map(known_unit, re.split(r"[\s,;]+", " ".join(said))) if unit in TURN
-    }
+    said = " ".join(one["units"] for line in of_motion for one in _UNIT_OF_ALL.finditer(line))
+    angles = {*map(known_unit, re.split(r"[\s,;]+", said))} & TURN.keys()
     if len(angles) == 1:
         texts |= {"units": tuple(map(str, angles))}
     if table.named:
