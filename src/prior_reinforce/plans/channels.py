@@ -53,7 +53,7 @@ _INCREMENT = re.compile(
 )
 """What an increment is called, in `_words`; `world_vector` is that of RT-1 (Open X-Embodiment), and
 `delta_1` a joint of a delta robot."""
-_LOAD = r"force|torque|wrench|effort|\b(f|tau) ext\b"
+_LOAD = r"force|torque|wrench|effort|\bloads?\b|\b(f|tau) ext\b"
 """What a load is called; `O_F_ext_hat_K` and `tau_ext` are libfranka's."""
 _TOOL = (
     r"grip|jaw|finger|width|claw|opening|suction|robotiq|wsg|greifer|pince|夹爪|夹具|vacuum|valve"
@@ -93,8 +93,10 @@ _SPEED = (
 """What a speed is called, `cmdvel` and `xdot` too; `swivel`, `level`, UR's `movel`,
 `wrist_twist` and `omega7_joint1` are none."""
 _ACCELERATION = r"accel|\b(ang|lin)?acc\b|ddot\b|jerk|beschleun"
+_POSITION = r"(q ?(pos)?|pos(itions?)?|angles?)\b"
 _NO_POSITION = re.compile(
-    rf"{_SPEED}|{_LOAD}|{_ACCELERATION}|tau|current|temperature|cartesian|tcp|pose"
+    rf"{_SPEED}|{_LOAD}|{_ACCELERATION}|tau|(?<!pos )(?<!position )(?<!positions )(?<!\bq )current"
+    rf"(?! (\w+ )*{_POSITION})|temperature|voltage|cartesian|tcp|pose"
     r"|delta|increment|relative|residual|derivative|moment|couple|力矩|扭矩|トルク|增量|増分"
     r"|\b(d+ ?q|qd+|q ?dot|dot|temp|tool|ee|eef|rate|inc|incr|diff|rel|err|error|offset|step"
     r"|change|noise|std|var|gain|k ?[pid])\b"

@@ -363,6 +363,17 @@ def test_comments_and_a_json_beside_say_the_units_that_heads_do_not(tmp_path, co
     assert (read.units, read.clock) == (units, "t in s")
 
 
+@pytest.mark.parametrize("stem", ["actual_current", "tau_J", "actual_qd"])
+def test_numbered_torques_that_are_named_as_the_motion_are_no_joints(tmp_path, stem):
+    heads = ",".join(f"{of}_{i}" for of in (stem, "actual_q") for i in range(2))
+    rows = "".join(f"{k / 50},{k},{k},{k / 99},{k / 99}\n" for k in range(50))
+    (tmp_path / "a.csv").write_text(f"t,{heads}\n{rows}")
+    with pytest.raises(FileFormatError, match=rf"{stem} looks like .*--key"):
+        read_recordings(tmp_path / "a.csv", key=[stem], joints=["pan", "lift"])
+    (read,) = read_recordings(tmp_path / "a.csv", key=["actual_q"], joints=["pan", "lift"])
+    assert read.positions.max() < 1
+
+
 @pytest.mark.parametrize("cell", ["{} rad", "{},5"])
 def test_cells_of_numbers_in_other_forms_are_no_names_of_columns(tmp_path, cell):
     rows = "\n".join(f"{k / 50};{';'.join([cell.format(k)] * 2)};0.{k}" for k in range(5))

@@ -111,7 +111,9 @@ def test_the_only_array_that_may_be_the_motion_is_it(name, keys):
         assert motion_keys("a.npz", ReadOptions(), shapes, ("q",)) == keys
 
 
-@pytest.mark.parametrize("key", ["joint_torques", "obs/ddq", "q_error", "observation.effort"])
+@pytest.mark.parametrize(
+    "key", ["joint_torques", "obs/ddq", "q_error", "observation.effort", "load"]
+)
 def test_torques_that_are_named_as_the_motion_are_no_joints(key):
     arrays = {key: Q, "t": np.arange(101) / 50}
     with pytest.raises(FileFormatError, match=r"no positions: record those.*--key"):
@@ -124,6 +126,21 @@ def test_torques_that_are_named_as_the_motion_are_no_joints(key):
     assert (
         recorded_among(Path("a.h5"), "a", (key,), arrays, plain, texts={}).positions.shape[1] == 3
     )
+
+
+def test_torques_beside_joints_are_none_and_positions_of_now_are(tmp_path):
+    arrays = {"q": Q[:, :1], "tau": Q[:, :1], "gripper_current": Q[:, 0], "t": np.arange(101) / 50}
+    arrays |= {"current_joint_pos": Q, "joint_position_current": Q}
+
+    def read(*keys):
+        options = ReadOptions(key=keys, joints=UR[: len(keys)] if len(keys) > 1 else UR)
+        return recorded_among(Path("a.h5"), "a", keys, arrays, options, texts={}).positions
+
+    with pytest.raises(FileFormatError, match=r"tau looks like .*torques"):
+        read("q", "tau")
+    assert read("q", "gripper_current").shape == (101, 2)
+    for key in ("current_joint_pos", "joint_position_current"):
+        np.testing.assert_array_equal(read(key), Q)
 
 
 @pytest.mark.parametrize("q", [np.zeros(20), np.zeros((20, 6), dtype=bool), np.array(["a"])])

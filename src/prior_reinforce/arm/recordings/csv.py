@@ -35,7 +35,7 @@ from prior_reinforce.arm.recordings.recording import (
     unread,
     without_units,
 )
-from prior_reinforce.arm.recordings.stated import headed, names_said
+from prior_reinforce.arm.recordings.stated import headed, names_said, refuse_rates
 from prior_reinforce.arm.recordings.table_times import (
     called_times,
     clock_of_table,
@@ -61,8 +61,6 @@ _FEW_FILES = 4
 """Files of a folder that are read again to tell whether one is unlike. Ours."""
 _ECHOED = ("name", "position", "velocity", "effort")
 """Arrays of a sensor_msgs/JointState, in order."""
-_SECOND = 10**9
-"""In [ns]."""
 
 
 class LogFormat(NamedTuple):
@@ -383,6 +381,7 @@ def _by_key(
     table: Table, keys: Sequence[str], others: Sequence[int], joints: Sequence[str]
 ) -> list[int]:
     """Columns of the motion by the name before their numbers; by their own, those beside them."""
+    refuse_rates(table.where, keys, joints)
     names = [table.names[i] for i in others]
     groups = vectors(names)
     columns = []
@@ -435,7 +434,7 @@ def _of_echo(table: Table) -> Table:
     if not texts or texts != [*range(2, texts[-1] + 1)]:
         return table
     stamps = table.values[:, :2]
-    if np.any(stamps != np.floor(stamps)) or np.any(stamps < 0) or np.any(stamps[:, 1] >= _SECOND):
+    if np.any(stamps != np.floor(stamps)) or np.any(stamps < 0) or np.any(stamps[:, 1] >= 10**9):
         return table
     frame = ["frame_id"] if table.names[texts[0]] == "column 3" else []
     count = len(texts) - len(frame)

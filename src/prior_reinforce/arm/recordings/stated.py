@@ -46,6 +46,7 @@ from prior_reinforce.errors import FileFormatError
 from prior_reinforce.plans.channels import (
     Kind,
     is_of_pose,
+    is_of_tool,
     kinds,
     one_for_all,
     says_no_position,
@@ -159,7 +160,7 @@ def recorded_among(
     `arrays` are all that may say something of it, `texts` what the file says in words, `stated`
     further numbers, such as a rate. `names` are those of the columns, if they are known.
     """
-    _refuse_rates(f"{where}: {episode}", keys[0], options.joints or ())
+    refuse_rates(f"{where}: {episode}", keys, options.joints or ())
     count = len(arrays[keys[0]])
     stated = stated or {}
     # A number a frame is (T,), also where it was written as (T, 1) or (1, T).
@@ -189,16 +190,18 @@ def recorded_among(
     return recorded(episode, clock, positions, bare, units=units, **more)
 
 
-def _refuse_rates(where: str, key: str, joints: Sequence[str]) -> None:
-    """FileFormatError if joints are to be what is called velocities, torques or the like."""
-    own = _STEMS.split(key)[-1]
-    of_plan = Kind.ANGLE in kinds(joints) and not any(map(says_no_position, joints))
-    if of_plan and says_no_position(own) and not is_of_pose(own):
-        raise FileFormatError(
-            f"{where}: {key} looks like velocities, torques or the like, and not the positions of "
-            f"{say_names(joints)}: name what holds those with --key, or record them; if it holds "
-            "them, rename it"
-        )
+def refuse_rates(where: str, keys: Sequence[str], joints: Sequence[str]) -> None:
+    """FileFormatError if joints are to be what a key calls velocities, torques or the like."""
+    if Kind.ANGLE not in kinds(joints) or any(map(says_no_position, joints)):
+        return
+    for key in keys:
+        own = _STEMS.split(key)[-1]
+        if says_no_position(own) and not is_of_pose(own) and not is_of_tool(own):
+            raise FileFormatError(
+                f"{where}: {key} looks like velocities, torques or the like, and not the positions "
+                f"of {say_names(joints)}: name what holds those with --key, or record them; if it "
+                "holds them, rename it"
+            )
 
 
 def _refuse_normalised(
