@@ -45,9 +45,36 @@ def test_what_was_written_for_failed_reads_is_no_unit_and_no_turn(fill):
         select([replace(told, positions=q)])
     q[40:43, 1] = np.nan
     assert "3 frames are left out" in select([replace(told, positions=q)]).recordings[0].remarks[0]
+    still = replace(told, positions=np.zeros((100, 3)))
+    assert not select([still]).recordings[0].positions.any()
+    ended = replace(told, positions=np.where(T[:, None] < 0.95, 0.01, [0.3, 1.2, 0.4]))
+    assert select([ended]).recordings[0].positions.max() == pytest.approx(1.2)  # at its end
     q[:, 1:] = 0.0, 0.0
     q[40:43, 1] = q[60:63, 2] = 1.0  # a switch
     assert select([replace(told, positions=q)]).recordings[0].positions.max() == 1.0
+
+
+@pytest.mark.parametrize(
+    ("channel", "fill", "frames", "usual"),
+    [
+        ("elbow", -999.0, (0,), None),
+        ("elbow", -999.0, (98, 99), None),
+        ("elbow", 32767.0, (0, 1, 50), None),
+        ("elbow", -999.0, (40, 41), 0.0),  # a locked joint
+        ("gripper", -1.0, (40, 41), None),
+    ],
+)
+def test_a_read_may_fail_in_the_first_frame_of_a_locked_joint_and_of_a_gripper(
+    channel, fill, frames, usual
+):
+    names = ("j1", "elbow", "gripper")
+    (told,) = takes(names, [0.3, 1.2, 0.04])
+    q = told.positions.copy()
+    if usual is not None:
+        q[:, names.index(channel)] = usual
+    q[list(frames), names.index(channel)] = fill
+    with pytest.raises(InvalidDemonstrationsError, match=rf"{channel} is .* write nan there"):
+        select([replace(told, positions=q)])
 
 
 @pytest.mark.parametrize(

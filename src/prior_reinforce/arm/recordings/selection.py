@@ -32,11 +32,13 @@ from prior_reinforce.plans.channels import (
     says_no_position,
 )
 from prior_reinforce.plans.whole_turns import TURN
+from prior_reinforce.units import UNITS
 from prior_reinforce.wording import listed
 
 _MOST_LOST = 0.1
 """Share of an episode's frames that may be lost. Ours: lost packets come in bursts of some frames;
 where more is missing, the recorder failed."""
+_LIKE_RATES = "look like velocities, torques or the like"
 _BEYOND = 5.0
 """A few frames that are so many times as large as all others were not read. Ours: a motion passes
 through what lies between."""
@@ -184,10 +186,7 @@ def _refuse_places(
     turning = [(j, n, kind) for j, n, kind, unit in each if unit in TURN]
     places = [(j, n) for j, n, kind in turning if kind is Kind.PLACE]
     rates = [(j, n) for j, n, _ in turning if says_no_position(j) and n not in no_joint]
-    for wrong, are in (
-        (places, "are a place"),
-        (rates, "look like velocities, torques or the like"),
-    ):
+    for wrong, are in ((places, "are a place"), (rates, _LIKE_RATES)):
         if wrong:
             recorded, called = zip(*wrong, strict=True)
             raise ConfigurationError(
@@ -269,10 +268,8 @@ def _columns(
             there += f": {say_names(tool)} look like the pose of a tool"
             by_key = f" {shlex.join(tool)}{by_key}"
         elif rates and len(recording.names) - len(rates) < len(joints):
-            there += (
-                f": {say_names(rates)} look like velocities, torques or the like, and positions "
-            )
-            there += "are missing; record them, or if another column holds them"
+            there += f": {say_names(rates)} {_LIKE_RATES}, and positions are missing; record them, "
+            there += "or if another column holds them"
         beside = list(recording.beside)
         for joint in missing_channels(joints, recording.names):
             for place in find_channels((joint,), beside) or ():
@@ -296,22 +293,25 @@ def _refuse_failed_reads(
 ) -> None:
     """Refuse what a recorder writes in a few frames where it read nothing, such as -999.
 
-    It is far beyond all other frames, and beyond those of all channels of its kind. Tools switch,
-    and increments and speeds are large in a few frames alone: these are not judged.
+    It is far beyond all other frames, and beyond those of all channels of its kind. Increments and
+    speeds are large in a few frames alone, and tools open for a few: these are not judged, unless
+    a tool opens by less than nothing. In the first and last frame, and where all others are 0, a
+    motion may be as large: only what no angle reaches in any unit is refused there.
     """
     size, of_kind = np.abs(positions), kinds(joints)
-    if not len(size):
-        return
-    most = size.max(axis=0)
-    rest = np.where(size <= most / 2, size, 0.0).max(axis=0)
+    most = size.max(axis=0, initial=0.0)
+    rest = np.where(size <= most / 2, size, 0.0).max(axis=0, initial=0.0)
     usual = np.where(_BEYOND * rest < most, rest, most)
     for i, kind in enumerate(of_kind):
-        if kind in (Kind.TOOL, *RATES) or is_increment(joints[i]):
-            continue
         far = np.flatnonzero(size[:, i] > most[i] / 2)
-        few = len(far) < _MOST_LOST * len(size) and not {0, len(size) - 1} & {*far.tolist()}
+        opens = kind is Kind.TOOL and np.any(positions[far, i] > 0)
+        if opens or kind in RATES or is_increment(joints[i]):
+            continue
+        no_angle = kind is Kind.ANGLE and most[i] > UNITS["deg"].largest
+        moves = rest[i] > 0 and not {0, len(size) - 1} & {*far.tolist()}
+        few = len(far) < _MOST_LOST * len(size) and (no_angle or moves)
         alike = max(usual[j] for j, other in enumerate(of_kind) if other is kind)
-        if few and most[i] > alike and 0 < _BEYOND * rest[i] < most[i]:
+        if few and most[i] > alike and _BEYOND * rest[i] < most[i]:
             raise InvalidDemonstrationsError(
                 f"episode {episode}: {called[i]} is {positions[far[0], i]:.4g} in {len(far)} of "
                 f"{len(size)} frames, first in {far[0]}, and {rest[i]:.4g} at most in all others, "
