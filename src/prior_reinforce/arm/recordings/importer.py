@@ -280,7 +280,7 @@ class Recordings:
             return found, ()
         found, doubts = beside_tables(found, own, others)
         chosen = [recording.episode for recording in self.episodes]
-        if self.options.leave_out and not missing_outcomes(chosen, found):
+        if not missing_outcomes(chosen, found):  # rows of others may be anything
             found = found.of(chosen)
         found, more = in_units(found, wanted.outcome_units, unit)
         return found, doubts + more
