@@ -203,8 +203,9 @@ def test_a_column_of_one_number_that_is_a_rate_is_that_of_the_frames(tmp_path, h
     if head != "dt_ms":  # else it is summed, and held against the rate as times are
         with pytest.raises(ConfigurationError, match=f"says 40 .* by its {head}.*drop --rate"):
             read_recordings(path, joints=["a"], rate=100)
-    path = table(tmp_path, "a,freq", [SWING, np.full(60, 2)])  # of the swing
-    assert read_recordings(path, joints=["a"], rate=100)[0].period == pytest.approx(0.01)
+    for other in ("freq", "Freq_Hz"):  # of the swing
+        path = table(tmp_path, f"a,{other}", [SWING, np.full(60, 20)])
+        assert read_recordings(path, joints=["a"], rate=100)[0].period == pytest.approx(0.01)
 
 
 def test_a_rate_in_a_comment_says_nothing_against_times(tmp_path):

@@ -43,7 +43,7 @@ _SAYS = re.compile(
     r"([A-Za-z][A-Za-z_ ]*?)\s*[:=]\s*(\d+\.?\d*(?:[eE][-+]?\d+)?)(?![\d.:-]|,\d)\s*([A-Za-zµ]*)"
 )
 """`fps: 40`, `sample rate = 1 kHz`."""
-_OF_ANYTHING = ("rate", "freq", "frequency", "period")
+_OF_ANYTHING = re.compile(r"rate|period|freq(uency)?([ _]?hz)?", re.IGNORECASE)
 """Names of columns that may be of a swing, or a flow, as well as of frames."""
 _SECONDS = re.compile(r"(?P<stem>.*?)(secs?|seconds|s)")
 _THOUSAND = re.compile(r"\d{1,3}([.,]\d{3})+")
@@ -58,7 +58,7 @@ def _declared(table: Table, options: ReadOptions) -> dict[str, Any]:
     said = {
         name: float(own[0])
         for name, own in zip(table.names, table.values.T, strict=True)
-        if len(own) > 1 and np.ptp(own) == 0 and name.lower() not in _OF_ANYTHING
+        if len(own) > 1 and np.ptp(own) == 0 and not _OF_ANYTHING.fullmatch(name)
     }
     for line in table.comments:
         for name, number, unit in _SAYS.findall(line):
