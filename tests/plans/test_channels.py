@@ -105,8 +105,8 @@ def test_a_name_says_what_a_channel_is(kind, names):
             "dyaw drx dx gripper_dyaw world_vector_0 joint4.torque ddq_1 tcp_pose left/d_joint1 dQ"
             " linacc_1 twist.linear.x cmdvel_1 O_F_ext_hat_K_0 qddot_1 theta_ddot xdot joint1.d dd3"
             " scara/d v1 joint_current present_load",
-            "joint4 current_q joint_pos_current q_1 level_joint4 travelled dynamixel_1 gripper swivel_joint wrist_twist d3 D_1"
-            " scara/d3 d[3] q_d",
+            "joint4 current_q joint_pos_current q_1 level_joint4 travelled dynamixel_1 gripper"
+            " swivel_joint wrist_twist d3 D_1 scara/d3 d[3] q_d",
         ),
         (
             is_of_finger,

@@ -180,9 +180,8 @@ def clock_of(
             "one time a frame"
         )
     known = unit or split_unit(name, SECONDS)[1]
-    if known is not None and known != FRAME:
-        known, of_one = without_number(known)  # of `t [0.1 ms]`
-        numbers = numbers * of_one if of_one != 1 else numbers
+    known, of_one = without_number(known) if known else (None, 1.0)  # of `t [0.1 ms]`
+    numbers = numbers * of_one
     if known is None and time_unit is None and are_ticks(numbers):
         numbers, known = (numbers - numbers[0]) * 100, "ns"
     unknown = None if known or time_unit else _IN_BRACKETS.search(name)

@@ -325,9 +325,8 @@ def _finite(table: Table, row: int, column: int) -> float:
         if (said := _WITH_UNIT.fullmatch(cell)) and (unit := known_unit(said[2])):
             bare, head = split_unit(name, any_word=True)
             remedy = f"write {said[1]}, and the unit in the head: {bare} [{unit}]"
-            remedy = (
-                f"write numbers in {head}, without units" if head not in (None, unit) else remedy
-            )
+            if head not in (None, unit):
+                remedy = f"write numbers in {head}, without units"
         raise table.unlike(row, column, f", expected a finite number; {remedy}")
     return value
 

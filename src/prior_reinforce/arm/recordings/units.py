@@ -146,9 +146,8 @@ def judge_unit(
     """
     if number == 0 and not period:
         return unit
-    kind = f"opening in {unit}" if opening and f"opening in {unit}" in _PLAUSIBLE else unit
-    kind = "period" if period else kind
-    ranges = _PLAUSIBLE.get(kind, {unit: (0.0, float("inf"))})
+    kind = "period" if period else f"opening in {unit}" if opening else unit
+    ranges = _PLAUSIBLE.get(kind) or _PLAUSIBLE.get(unit, {unit: (0.0, float("inf"))})
     fitting = [u for u, (low, high) in ranges.items() if low <= number <= high]
     return unit if unit in fitting else next(iter(fitting), None)
 
