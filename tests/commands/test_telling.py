@@ -41,6 +41,7 @@ def asked(run, folder):
         (("--error", "-1e-2", "0"), [-0.01, 0.0]),
         (("--error", "5cm short and 2 cm right"), [-0.05, -0.02]),
         (("--error", "120cm long"), [1.2, 0.0]),
+        (("--error", "1.9512345", "0.0123456"), [1.9512345, 0.0123456]),  # as far as was shown
         (("--error", "hit"), None),
         (("--error", "0"), [0.0, 0.0]),
         (("--outcome", "0.9", "-0.1"), [0.0, -0.15]),

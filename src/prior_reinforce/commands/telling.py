@@ -188,15 +188,15 @@ def read_seen(text: str, goal: Goal) -> Reading | Point:
             f"an error needs {k} numbers, got {len(numbers)}: outcome minus goal in "
             f"{', '.join(form.names)}{example}"
         )
-    error = as_bare_error([number for number, _ in numbers], goal.goal, form)
+    bare = np.array([number for number, _ in numbers])
     sds = [sd for _, sd in numbers if sd is not None]
     if not sds:
-        return error
+        return bare  # the session judges it, which knows what is expected and was shown
     if len(sds) < k:
         raise InvalidFeedbackError(
             f"{text!r} has +- for {len(sds)} of {k} numbers; give all or none"
         )
-    return Reading.measured(error, np.array(sds))
+    return Reading.measured(as_bare_error(bare, goal.goal, form), np.array(sds))
 
 
 def read_landed(text: str, goal: Goal) -> Reading:
