@@ -27,8 +27,8 @@ _TOWARDS_BASE = 1e-3
 axis will do, as with a shift, it is the base."""
 _APART = 0.1
 """Bearings of two demonstrations at least, in [rad], to tell an axis by (ours)."""
-_NEAR = 0.1
-"""How far from the declared axis another is worth a warning, as a share of the reach (ours)."""
+NEAR = 0.1
+"""How far from an axis another counts as the same, as a share of the reach (ours)."""
 _TOLD_BY, _BETTER = 5, 3.0
 """So many demonstrations tell two axes apart, where one leaves so many times less (ours). Of every
 two to four of V1's, turned about its own axis, none differ more than unturned, and about a place
@@ -58,7 +58,7 @@ class Axis:
     def doubted(self) -> bool:
         """Whether the declared axis is probably not the one."""
         clearly = self.n >= _TOLD_BY and self.left > _BETTER * self.least
-        return self.off > _NEAR * self.reach and (self.left > 1.0 or clearly)
+        return self.off > NEAR * self.reach and (self.left > 1.0 or clearly)
 
     def __str__(self) -> str:
         """In one line, for a person."""

@@ -20,6 +20,7 @@ from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.symmetry.anchors import Anchors
+from prior_reinforce.plans.symmetry.axis import NEAR
 from prior_reinforce.plans.symmetry.declared import declare_symmetry
 from prior_reinforce.plans.symmetry.moves import Learned, TurnIncrements, TurnJoint
 from prior_reinforce.plans.symmetry.symmetry import Symmetry, turn_and_scale
@@ -31,9 +32,9 @@ _APART = 0.04
 """Standard deviation of directions at least, in [rad]."""
 _UNEXPLAINED = 0.2
 """What bearings may be off, of the standard deviation of directions."""
-_BY_CHANCE, _NEAR = 0.01, 0.1
+_BY_CHANCE = 0.01
 """Where an axis elsewhere explains bearings so much better that it is less probably by chance, and
-it is farther off than such a share of the outcomes' mean distance, none is found."""
+it is not near the origin, none is found."""
 
 
 def find_turn(demonstrations: Demonstrations) -> Symmetry | None:
@@ -103,7 +104,7 @@ def _axis_elsewhere(directions: Float[np.ndarray, " N"], places: Float[np.ndarra
     fitted = least_squares(off, there)
     ratio = 2.0 * float(fitted.cost) / float(np.square(off(there)).sum())
     by_chance = ratio ** ((len(places) - 3) / 2)
-    return bool(by_chance < _BY_CHANCE and np.linalg.norm(fitted.x[:2]) > _NEAR)
+    return bool(by_chance < _BY_CHANCE and np.linalg.norm(fitted.x[:2]) > NEAR)
 
 
 def _spread(angles: Float[np.ndarray, " N"]) -> float:
