@@ -9,6 +9,7 @@ from prior_reinforce.parsing import from_words, read_place
 from prior_reinforce.wording import (
     in_words,
     say_chance,
+    say_cost,
     say_length,
     say_place,
     say_trials,
@@ -88,6 +89,12 @@ def test_places_are_said_as_seen_from_the_base(place, said):
 )
 def test_lengths(length, form, said):
     assert say_length(length, form) == said
+
+
+def test_the_papers_count_is_demonstrations_plus_trials():
+    assert say_cost(1, 1) == "N = 1 demonstration + 1 trial = 2"
+    assert say_cost(6, 2) == "N = 6 demonstrations + 2 trials = 8"
+    assert say_cost(6, 1.25) == "N = 6 demonstrations + 1.2 trials = 7.2"
 
 
 def test_trials_to_go_are_counted_up_to_ten():

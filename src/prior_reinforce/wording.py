@@ -84,6 +84,17 @@ def say_count(n: int, what: str) -> str:
     return f"{n} {what}" if n == 1 else f"{n} {what}s"
 
 
+def say_cost(demonstrations: int, trials: float) -> str:
+    """Say the paper's count N of a goal, or of several with the mean of their trials.
+
+    For instance `N = 6 demonstrations + 2 trials = 8`, or `... + 2.5 trials = 8.5`.
+    """
+    shown = say_count(demonstrations, "demonstration")
+    if isinstance(trials, int):
+        return f"N = {shown} + {say_count(trials, 'trial')} = {demonstrations + trials}"
+    return f"N = {shown} + {trials:.1f} trials = {demonstrations + trials:.1f}"
+
+
 def listed(items: Sequence[str], separator: str = ", ", most: int = 12) -> str:
     """Join the first items, and count the rest."""
     more = f" and {len(items) - most} more" if len(items) > most else ""

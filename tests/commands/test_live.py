@@ -13,7 +13,6 @@ from prior_reinforce.commands.live import (
     LiveView,
     drawing_progress,
     fit_progress,
-    goals_reached,
     say,
 )
 from prior_reinforce.errors import WorkspaceError
@@ -21,6 +20,7 @@ from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.generators.base import FitProgress
 from prior_reinforce.readings import Reading
 from prior_reinforce.simulation.protocol import GoalTrials
+from tests.report.swing_world import told as record
 
 DEMONSTRATIONS = SimpleNamespace(n=6, outcome_format=OutcomeFormat.metres(2))
 TIMED = SimpleNamespace(n=5, outcome_format=OutcomeFormat(("x", "arrival"), ("m", "s")))
@@ -42,6 +42,8 @@ TRIALS = (
     trial(2, [0.95, 0.1], [0.0, 0.0]),
     trial(3, [0.95, 0.08], [0.0, 0.01], hit=True),
 )
+SOLVED = record([0.05, 0.0], [0.0, 0.02], [0.0, 0.01])
+MISSED = record([0.05, 0.0], [0.0, 0.02])
 
 
 @pytest.fixture
@@ -92,21 +94,21 @@ def test_a_time_is_no_length():
 def test_the_papers_count_is_demonstrations_plus_trials(view):
     shown, told = view
     shown.goal(2, 3, GOAL)
-    solved, missed = GoalTrials(GOAL, TRIALS, ()), GoalTrials(GOAL, TRIALS[:2], ())
-    shown.end(solved)
-    shown.end(missed)
-    shown.summary([solved, missed])
+    shown.end(GoalTrials(GOAL, TRIALS, ()))
+    shown.end(GoalTrials(GOAL, TRIALS[:2], ()))
+    shown.summary([SOLVED, MISSED])
     said = told.getvalue()
     assert "goal 2 of 3: 100 cm ahead, 10 cm left" in said
     assert "N = 6 demonstrations + 3 trials = 9" in said
     assert "not reached in 2 trials" in said
     assert "trials by goal: 3, 2+" in said
-    assert "1 of 2 goals reached, on average N = 6 + 3.0 = 9.0 trials" in said
+    assert "1 of 2 goals reached, on average N = 6 demonstrations + 3.0 trials = 9.0" in said
 
 
-def test_where_no_goal_was_reached_nothing_is_counted():
-    missed = GoalTrials(GOAL, TRIALS[:2], ())
-    assert goals_reached(6, [missed, missed]) == ("0 of 2 goals reached", "")
+def test_where_no_goal_was_reached_nothing_is_counted(view):
+    shown, told = view
+    shown.summary([MISSED, MISSED])
+    assert told.getvalue() == ""
 
 
 def test_a_fit_shows_its_loss_and_the_time_left(monkeypatch):

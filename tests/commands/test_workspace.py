@@ -32,7 +32,7 @@ def test_an_afternoon(run, folder):
     _, out, _ = run("tell", folder, 4, "--hit")
     assert "trial 4: reached" in out
     _, out, _ = run("status", folder)
-    assert "reached in 3 trials (N = 4 demonstrations + 3 = 7)" in out
+    assert "reached in 3 trials (N = 4 demonstrations + 3 trials = 7)" in out
     assert len([line for line in out.splitlines() if "  note" not in line]) <= 10
     assert "this trial repeats it" in run("ask", folder)[1]
     run("void", folder, 5)

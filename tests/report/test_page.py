@@ -94,7 +94,8 @@ def test_numbers_appear_as_told(report, records):
     counts = [r.trials_to_hit for r in records]
     assert "2 of 2 goals reached" in words
     assert TABLE in words
-    assert f"N = 6 + {np.mean(counts):.1f} trials" in words
+    mean = np.mean(counts)
+    assert f"N = 6 demonstrations + {mean:.1f} trials = {6 + mean:.1f}" in words
     assert "92 cm ahead, 10 cm left" in words
     assert "100 cm ahead, 22 cm right" in words
     assert "voided: ball slipped" in words

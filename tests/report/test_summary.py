@@ -52,13 +52,19 @@ def test_how_many_trials_are_to_go_is_left_out_where_nobody_knows():
 
 def test_the_headline_counts_as_the_paper_does():
     said = headline([REACHED_IN_1, REACHED_IN_2])
-    assert (said.text, said.count) == ("2 of 2 goals reached", "N = 6 + 1.5 trials")
+    assert (said.text, said.count) == (
+        "2 of 2 goals reached",
+        "N = 6 demonstrations + 1.5 trials = 7.5",
+    )
     assert "from 1 to 2" in said.explanation
 
 
 def test_the_headline_admits_goals_that_were_not_reached():
     said = headline([REACHED_IN_2, MISSED])
-    assert (said.text, said.count) == ("1 of 2 goals reached", "N = 6 + 2.0 trials")
+    assert (said.text, said.count) == (
+        "1 of 2 goals reached",
+        "N = 6 demonstrations + 2.0 trials = 8.0",
+    )
     assert "leaves out the 1 goal that was not reached" in said.explanation
 
 
@@ -74,7 +80,7 @@ def test_goals_with_no_trial_that_counts_are_named_and_not_counted():
 
 def test_one_goal_has_a_headline_of_its_own():
     assert headline([REACHED_IN_2]).text == "Goal reached"
-    assert headline([REACHED_IN_2]).count == "N = 6 + 2 trials"
+    assert headline([REACHED_IN_2]).count == "N = 6 demonstrations + 2 trials = 8"
     assert headline([MISSED]).count == ""
 
 

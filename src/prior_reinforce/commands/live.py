@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING
 
-import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 from rich.text import Text
@@ -18,11 +17,12 @@ from prior_reinforce.commands.questions import answer_to, until_read
 from prior_reinforce.errors import PerceptionFailedError, PriorReinforceError
 from prior_reinforce.parsing import from_words
 from prior_reinforce.readings import Reading
+from prior_reinforce.report.summary import headline
 from prior_reinforce.terminal import plain
 from prior_reinforce.wording import (
     error_example,
     say_chance,
-    say_count,
+    say_cost,
     say_place,
     say_reading,
     to_words,
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from prior_reinforce.generators.base import FitProgress
     from prior_reinforce.perception.base import Perception
     from prior_reinforce.plans.motions import Demonstrations
+    from prior_reinforce.report import AdaptationRecord
     from prior_reinforce.simulation.protocol import FailedReading, GoalTrials
 
 
@@ -75,31 +76,19 @@ class LiveView:
         if (n := result.solved_at) is None:
             self._say("  ", ("not reached", "bold red"), f" in {len(result.trials)} trials")
         else:
-            shown, trials = say_count(self._n, "demonstration"), say_count(n, "trial")
-            self._say(f"  reached: N = {shown} + {trials} = {self._n + n}")
+            self._say(f"  reached: {say_cost(self._n, n)}")
 
-    def summary(self, results: Sequence[GoalTrials]) -> None:
+    def summary(self, records: Sequence[AdaptationRecord]) -> None:
         """Print the count over all goals."""
-        reached, count = goals_reached(self._n, results)
-        if len(results) < 2 or not count:
-            return
-        self._say((f"\n{reached}", "bold"), f", on average {count}")
-        self._say(f"trials by goal: {trials_by_goal(results)}")
+        said = headline(records)
+        if len(records) > 1 and said.count:
+            self._say((f"\n{said.text}", "bold"), f", on average {said.count}")
+            self._say(f"trials by goal: {trials_by_goal(records)}")
 
 
-def goals_reached(n: int, results: Sequence[GoalTrials]) -> tuple[str, str]:
-    """Say how many goals were reached, and if any, their mean count N, with n demonstrations."""
-    solved = [result.solved_at for result in results if result.solved_at is not None]
-    reached = f"{len(solved)} of {say_count(len(results), 'goal')} reached"
-    if not solved:
-        return reached, ""
-    mean = float(np.mean(solved))
-    return reached, f"N = {n} + {mean:.1f} = {n + mean:.1f} trials"
-
-
-def trials_by_goal(results: Sequence[GoalTrials]) -> str:
+def trials_by_goal(records: Sequence[AdaptationRecord]) -> str:
     """Say how many trials each goal took, in order; `10+` where it was not reached."""
-    return ", ".join(str(r.solved_at or f"{len(r.trials)}+") for r in results)
+    return ", ".join(str(r.trials_to_hit or f"{len(r.told)}+") for r in records)
 
 
 def asking(

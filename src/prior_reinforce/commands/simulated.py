@@ -18,7 +18,6 @@ from prior_reinforce.commands.live import (
     LiveView,
     asking,
     fit_progress,
-    goals_reached,
     say,
     trials_by_goal,
 )
@@ -33,11 +32,11 @@ from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.vlm_client import without_secrets
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.report import AdaptationRecord, write_report
+from prior_reinforce.report.summary import headline
 from prior_reinforce.session.session import Session
 from prior_reinforce.simulation.adaptation import goal_record, recording
 from prior_reinforce.simulation.learned import load_learned, save_learned
 from prior_reinforce.simulation.protocol import (
-    GoalTrials,
     perceive_demonstrations,
     reach_goals,
     unseen_goals,
@@ -99,7 +98,6 @@ class Reached:
     """Goals that were worked through, and what their report says."""
 
     out: Path
-    results: list[GoalTrials]
     records: list[AdaptationRecord]
     title: str
     facts: dict[str, str]
@@ -107,8 +105,8 @@ class Reached:
 
     def __str__(self) -> str:
         """The count, for a person."""
-        said = goals_reached(self.records[0].demonstrations.n, self.results)
-        return ", ".join(filter(None, said))
+        said = headline(self.records)
+        return ", ".join(filter(None, [said.text, said.count]))
 
     def write(self, note: str = "") -> int:
         """Write the report; exit status 1 if a goal was not reached."""
@@ -124,7 +122,7 @@ class Reached:
         say(console, f"report: {page}")
         if (self.out / SEEN).is_dir():
             say(console, f"what was seen, with boxes and all answers: {self.out / SEEN}")
-        return 0 if all(result.solved_at for result in self.results) else 1
+        return 0 if all(record.trials_to_hit for record in self.records) else 1
 
 
 @dataclass(frozen=True)
@@ -179,7 +177,7 @@ class Adapt(_Reaching, OnTask):
             else:
                 generator = load_learned(self.model, demonstrations)
             session = Session(generator, adapter, demonstrations)
-            results, records = self._adapt(task, session, perception, goals, console)
+            records = self._adapt(task, session, perception, goals, console)
         seen_by = self.perception
         if seen_by.split(",")[0] == "vlm":
             seen_by += f", {model.model} at {without_secrets(model.base_url)}"
@@ -192,12 +190,12 @@ class Adapt(_Reaching, OnTask):
             "Adapter": self.adapter,
             "Perception": seen_by,
             "Seed": str(self.seed),
-            "Trials by goal": trials_by_goal(results),
+            "Trials by goal": trials_by_goal(records),
             "Earlier goals' trials used": "yes" if session.goals[-1].carry_over else "no",
             "Version": prior_reinforce.__version__,
         }
         title = f"{task.name}: {say_count(len(goals), 'new goal')}"
-        return Reached(self.out, results, records, title, facts, task.region)
+        return Reached(self.out, records, title, facts, task.region)
 
     def _perceive(
         self, task: Task, recorded: Demonstrations, perception: Perception, console: Console
@@ -215,10 +213,9 @@ class Adapt(_Reaching, OnTask):
 
     def _adapt(
         self, task: Task, session: Session, perception: Perception, goals: Points, console: Console
-    ) -> tuple[list[GoalTrials], list[AdaptationRecord]]:
+    ) -> list[AdaptationRecord]:
         """Work through goals in one session, with a live view."""
         view = LiveView(console, session.demonstrations)
-        results: list[GoalTrials] = []
         records: list[AdaptationRecord] = []
         for i, goal in enumerate(goals, start=1):
             view.goal(i, len(goals), goal)
@@ -235,14 +232,13 @@ class Adapt(_Reaching, OnTask):
                 on_failed_reading=asking(console, session.demonstrations, eyes),
             )
             view.end(result)
-            results.append(result)
             film_in, demonstrations = self.out if self.film else None, session.demonstrations
             record = goal_record(task, demonstrations, result, i, film_in=film_in, seed=seed)
             if self.film and record.film is None:
                 say(console, record.film_caption)
             records.append(record)
-        view.summary(results)
-        return results, records
+        view.summary(records)
+        return records
 
     def _goals(self, task: Task, demonstrations: Demonstrations) -> Points:
         if set(self.goal) == {"random"}:

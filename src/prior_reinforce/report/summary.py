@@ -56,7 +56,7 @@ class Headline:
     text: str
     """For instance `5 of 5 goals reached`."""
     count: str
-    """For instance `N = 6 + 2.2 trials`; empty while no goal is reached."""
+    """See `wording.say_cost`; empty while no goal is reached."""
     explanation: str
     complete: bool = True
     """Whether the count is of every goal that was tried."""
@@ -103,7 +103,7 @@ def headline(records: Sequence[AdaptationRecord]) -> Headline:
     if missing:
         goals = "goal that was" if missing == 1 else "goals that were"
         left_out = f" This leaves out the {missing} {goals} not reached."
-    count = f"N = {n} + {mean:.1f} trials" if several else f"N = {n} + {most} trials"
+    count = wording.say_cost(n, mean if several else most)
     explanation = f"{say_count(n, 'demonstration')}, then {spent}.{left_out} {within}"
     return Headline(text, count, explanation, complete=not missing)
 

@@ -25,13 +25,13 @@ def test_status_is_short_and_says_what_is_next(workspace):
     tell(workspace, ask(workspace).number, [0.0, 0.0])
     text = describe(workspace)
     assert "5 cm long" in text
-    assert "reached in 2 trials (N = 4 demonstrations + 2 = 6)" in text
+    assert "reached in 2 trials (N = 4 demonstrations + 2 trials = 6)" in text
     assert len(text.splitlines()) <= 12
 
 
 def test_a_first_trial_that_hits_is_one_trial(workspace):
     tell(workspace, ask(workspace).number, [0.0, 0.0])
-    assert "reached in 1 trial (N = 4 demonstrations + 1 = 5)" in describe(workspace)
+    assert "reached in 1 trial (N = 4 demonstrations + 1 trial = 5)" in describe(workspace)
 
 
 @pytest.mark.slow

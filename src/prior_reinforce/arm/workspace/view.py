@@ -24,6 +24,7 @@ from prior_reinforce.terminal import plain
 from prior_reinforce.wording import (
     as_html,
     say_chance,
+    say_cost,
     say_count,
     say_place,
     say_reading,
@@ -336,8 +337,7 @@ def _say_goal(view: StatusView, goal: GoalView) -> str:
     place = say_place(goal.goal, view.outcome_format)
     n, hits = view.demonstrations, goal.reached_after
     if hits is not None:
-        total = f"N = {say_count(n, 'demonstration')} + {hits} = {n + hits}"
-        return f"{place}: reached in {say_count(hits, 'trial')} ({total})"
+        return f"{place}: reached in {say_count(hits, 'trial')} ({say_cost(n, hits)})"
     if goal.number < len(view.goals):
         if not goal.told:
             return f"{place}: not tried"
