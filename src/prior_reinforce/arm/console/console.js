@@ -225,6 +225,7 @@ const term = (c, value, words) => {
 const sayPlace = (place) => S.components.map((c, i) => term(c, place[i], c.places)).join(", ");
 const sayError = (error) =>
   S.components.filter((c, i) => number(c, error[i])).map((c) => term(c, error[S.components.indexOf(c)], c.words)).join(", ") || "on the goal";
+const count = (n, what) => `${n} ${what}${n === 1 ? "" : "s"}`;
 const minus = (a, b) => a.map((v, i) => v - b[i]);
 const openTrial = () => (S ? S.open_trial : null);
 const numberOpen = (state) => (state.open_trial ? state.open_trial.number : null);
@@ -321,7 +322,7 @@ function title() {
   if (S.learning) return "Learning";
   const trial = openTrial();
   if (S.step === "execute") return touching() === "tell" ? `Trial ${trial.number}: throw, then touch` : `Trial ${trial.number} is ready`;
-  if (S.step === "reached") return `Reached in ${goalNow().told === 1 ? "1 trial" : `${goalNow().told} trials`}`;
+  if (S.step === "reached") return `Reached in ${count(goalNow().reached_after, "trial")}`;
   return TITLES[S.step];
 }
 
@@ -828,7 +829,7 @@ const old = (trial) => trial.outdated && h("p", { class: "ask" }, "Planned befor
 function goalPanel(off) {
   const goal = goalNow();
   return [
-    S.step === "reached" && h("p", { class: "chance hit" }, `Goal ${goal.number} is reached: N = ${S.shown.length} + ${goal.told}.`),
+    S.step === "reached" && h("p", { class: "chance hit" }, `Goal ${goal.number} is reached: N = ${count(S.shown.length, "demonstration")} + ${count(goal.reached_after, "trial")} = ${S.shown.length + goal.reached_after}.`),
     button("goal", marked() ? `Aim at ${sayPlace(L.mark)}` : S.step === "reached" && !L.mark ? "Touch the next goal" : touchFirst("it should land"),
       () => setGoal({ goal: L.mark, new_hardware: L.changed || null }), "big", { disabled: !marked() || off.disabled }),
     S.step === "reached" && h("div", { class: "row" }, button("again", "Throw at it once more", () => verb("ask"), "", off)),
