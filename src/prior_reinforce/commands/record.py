@@ -314,19 +314,21 @@ def _new_folder(recordings: Path) -> Path:
 
 def _draw(take: Take, form: PlanFormat, channels: list[int], kind: Which, path: Path) -> None:
     """A take over time: what will be learned, and in grey the other motion."""
-    from prior_reinforce.report.style import INK_SOFT, calm_axes, drawing, new_figure, save_figure
+    from prior_reinforce.report import style
 
     other = next(motion for motion in _MOTIONS if motion != kind)
-    with drawing():
+    drawn = [
+        (take.t, take.motion(other, channels), {"color": style.INK_SOFT, "alpha": 0.5}),
+        (take.t, take.motion(kind, channels), {"linewidth": 1.5}),
+    ]
+    with style.drawing():
         columns = min(form.action_dim, 3)
         rows = -(-form.action_dim // columns)
-        figure = new_figure(3.0 * columns, 1.9 * rows)
+        figure = style.new_figure(3.0 * columns, 1.9 * rows)
         panels = figure.subplots(rows, columns, squeeze=False, sharex=True).ravel()
-        for j, (name, unit) in enumerate(zip(form.names, form.units, strict=True)):
-            calm_axes(panels[j])
-            panels[j].plot(take.t, take.motion(other, channels)[:, j], color=INK_SOFT, alpha=0.5)
-            panels[j].plot(take.t, take.motion(kind, channels)[:, j], linewidth=1.5)
-            panels[j].set_title(f"{name} [{unit}]", fontsize=9)
+        for j in range(form.action_dim):
+            style.calm_axes(panels[j])
+            style.draw_joint(panels[j], form, j, drawn, fontsize=9)
         for spare in panels[form.action_dim :]:
             spare.set_axis_off()
-        save_figure(figure, path)
+        style.save_figure(figure, path)

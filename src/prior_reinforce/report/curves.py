@@ -22,6 +22,7 @@ from prior_reinforce.report.style import (
     INK_SOFT,
     add_legend,
     calm_axes,
+    draw_joint,
     drawing,
     new_figure,
     trial_colour,
@@ -36,7 +37,7 @@ _LEAST_TRIALS = 3  # that the error's axis has room for
 _LEAST_SHARE = 0.02
 """Ours: a joint that moves less than this share of what moves most is drawn as nearly at rest."""
 _SHOWN: Any = {"label": "demonstrations", "color": DEMONSTRATION, "alpha": 0.45, "linewidth": 1}
-_MEASURED = "measured on the arm"
+_MEASURED: Any = {"label": "measured on the arm", "linestyle": ":", "linewidth": 2.2}
 _TIGHT: Any = {"handlelength": 1.6, "columnspacing": 1.4}
 
 _Plan = Float[np.ndarray, "_ D"]
@@ -139,6 +140,13 @@ def draw_plans(record: AdaptationRecord) -> Figure:
     plans = [t.plan if len(t.plan) else np.empty((0, d)) for t in record.trials]
     styles = [_trial_style(record, i) for i in range(len(plans))]
     first, differences = _differences(record.trials, plans)
+    drawn = [
+        *((np.arange(len(plan)) * form.dt, plan, _SHOWN) for plan in shown),
+        *((np.arange(len(p)) * form.dt, p, look) for p, look in zip(plans, styles, strict=True)),
+    ]
+    for number, (times, path) in record.measured.items():
+        at = next(i for i, trial in enumerate(record.trials) if trial.number == number)
+        drawn.append((times, path, styles[at] | _MEASURED))
     columns = min(_COLUMNS, d)
     rows = -(-d // columns)
     heights = [1.9, 1.3] if differences else [1.9]
@@ -156,14 +164,8 @@ def draw_plans(record: AdaptationRecord) -> Figure:
                 axes.set_axis_off()
         if j >= d:
             continue
-        for plan, style in zip((*shown, *plans), (*[_SHOWN] * len(shown), *styles), strict=True):
-            panel.plot(np.arange(len(plan)) * form.dt, plan[:, j], **style)
-        for number, (times, path) in record.measured.items():
-            at = next(i for i, trial in enumerate(record.trials) if trial.number == number)
-            dotted = styles[at] | {"linestyle": ":", "linewidth": 2.2, "label": _MEASURED}
-            panel.plot(times, path[:, j], **dotted)
+        draw_joint(panel, form, j, drawn, loc="left", fontsize=9.5, color=INK)
         widen(panel, shown, form.units, j, _LEAST_SHARE)
-        panel.set_title(f"{form.names[j]} [{form.units[j]}]", loc="left", fontsize=9.5, color=INK)
         for axes in below:
             scale, unit = (1000, "mrad") if form.units[j] == "rad" else (1, form.units[j])
             for off, style in zip(differences, styles, strict=True):

@@ -7,7 +7,7 @@ nothing is said by colour alone.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 
 from prior_reinforce.files import in_place
+from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.speeds import largest_of_unit
 
 INK = "#1f2933"
@@ -33,6 +34,8 @@ HIT = "#009e73"
 _TRIAL_FIRST = "#8db7e3"
 _TRIAL_LAST = "#16406f"
 
+TimedMotion = tuple[Float[np.ndarray, " _"], Float[np.ndarray, "_ _"], Mapping[str, Any]]
+"""Times [s], frames, and settings of `Axes.plot`."""
 PICTURE_DPI = 200
 """Twice a screen's resolution; sharp on paper at the size drawn."""
 
@@ -97,6 +100,23 @@ def calm_axes(axes: Axes, *, grid: bool = True) -> None:
     axes.set_axisbelow(True)
     if grid:
         axes.grid(color="#edf0f2", linewidth=0.8)
+
+
+def draw_joint(
+    axes: Axes,
+    form: PlanFormat,
+    j: int,
+    motions: Iterable[TimedMotion],
+    note: str = "",
+    **title: Any,
+) -> None:
+    """Draw column j of motions over time, and its name, unit and a note above it.
+
+    `title` are settings of `Axes.set_title`.
+    """
+    for times, motion, look in motions:
+        axes.plot(times, motion[:, j], **look)
+    axes.set_title(f"{form.names[j]} [{form.units[j]}]{note}", **title)
 
 
 def widen(

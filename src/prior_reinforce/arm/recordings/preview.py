@@ -204,25 +204,24 @@ class Preview:
         return f"hull in {name} of {area:.3g}{square} by {len(corners)} of {demos.n}; {nearest}"
 
     def _draw_channel(self, axes: Any, channel: int, colours: list[Any]) -> None:
-        from prior_reinforce.report.style import widen
+        from prior_reinforce.report.style import draw_joint, widen
 
         demos, form = self.demonstrations, self.demonstrations.format
         times = np.arange(demos.horizon) * form.dt
         starts = self.inspection.processed.starts
-        for recording, start in zip(self.inspection.recordings, starts, strict=True):
-            recorded = recording.positions[:, channel]
-            axes.plot(recording.times - start, recorded, color="0.8", linewidth=2.5, zorder=1)
+        changes, grey = self._changes(channel), {"color": "0.8", "linewidth": 2.5, "zorder": 1}
+        recorded = zip(self.inspection.recordings, starts, strict=True)
+        drawn = [(each.times - start, each.positions, grey) for each, start in recorded]
         for plan, colour in zip(demos.plans, colours, strict=True):
-            axes.plot(times, plan[:, channel], color=colour, linewidth=1.1, zorder=2)
+            drawn.append((times, plan, {"color": colour, "linewidth": 1.1, "zorder": 2}))
             moving = np.flatnonzero(np.any(plan != plan[-1], axis=1))
             end = min(int(moving[-1]) + 1, len(times) - 1) if moving.size else 0
             axes.plot(times[end], plan[end, channel], "o", color=colour, markersize=3, zorder=3)
-        changes = self._changes(channel)
         for at in changes:
             axes.axvline(at, color="0.5", linewidth=0.6, linestyle=":", zorder=0)
+        note = ", changes dotted" if len(changes) else ""
+        draw_joint(axes, form, channel, drawn, note, fontsize=10)
         widen(axes, demos.plans, form.units, channel, _LEAST_RANGE)
-        kind = ", changes dotted" if len(changes) else ""
-        axes.set_title(f"{form.names[channel]} [{form.units[channel]}]{kind}", fontsize=10)
         axes.set_xlabel("time from the plan's start [s]", fontsize=8)
         axes.tick_params(labelsize=8)
 
