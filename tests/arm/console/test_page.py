@@ -208,11 +208,11 @@ def test_from_recordings_to_a_hit_on_a_fresh_workspace(at, serve, tmp_path):
     )
     accessible(page)
     shot(page, "reached", tmp_path)
-    page.click("#again")
+    page.click("#again")  # which counts no more than the throws until it was reached
     page.click("#execute")
     expect(page.locator("#tell")).to_be_visible()
     touch(page, served.landed()[-1])
-    page.click("#tell")  # a throw more at the goal counts no more than the ones until it was reached
+    page.click("#tell")
     shown = f"N = 4 demonstrations + {trials} trial{'s' if trials > 1 else ''} = {4 + trials}"
     expect(page.locator("#act")).to_contain_text(shown)
     expect(page.locator("#now")).to_contain_text(f"Reached in {trials} trial")
