@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import importlib
 import inspect
-import operator
 import os
 import pkgutil
 import re
@@ -256,17 +255,11 @@ def _plain(taker: Callable[..., Any], settings: Mapping[str, Any], choice: str) 
 
 
 def _resolve(target: str) -> Any:
-    module, _, name = target.partition(":")
     try:
-        found = importlib.import_module(module)
-    except (ImportError, ValueError) as error:
+        return pkgutil.resolve_name(target)
+    except (ImportError, ValueError, AttributeError) as error:
         missing = missing_extra(error) if isinstance(error, ImportError) else None
-        if missing is not None:
-            raise missing from error
-        raise ConfigurationError(
-            f"cannot import {target}: {error}; it must be importable from here (PYTHONPATH)"
+        raise missing or ConfigurationError(
+            f"cannot import {target}: {error}; check its spelling, and that its module is "
+            "importable from here (PYTHONPATH)"
         ) from error
-    try:
-        return operator.attrgetter(name)(found)
-    except AttributeError as error:
-        raise ConfigurationError(f"cannot find {target}: {error}; check its spelling") from error
