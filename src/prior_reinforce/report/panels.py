@@ -121,7 +121,7 @@ class Panel:
     def draw_goal(self, record: AdaptationRecord) -> None:
         """Draw a goal and all that counts as reached."""
         x, y = self._place(record.goal)
-        radius = record.half_axes * record.scale
+        radius = record.format.half_axes * record.scale
         across = radius[self._view.across]
         if self._view.up is None:
             self._axes.axvspan(x - across, x + across, color=style.GOAL, alpha=0.13, linewidth=0)

@@ -98,7 +98,7 @@ def _panels(
     points = np.stack(seen) * record.scale
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     half = np.ptp(points, axis=0) * (0.5 + margin)
-    half = np.maximum(half, least * record.half_axes * record.scale)
+    half = np.maximum(half, least * record.format.half_axes * record.scale)
     around = _LABELS[1] + (_LEGEND if legend else 0)
     wanted = _HEIGHT
     if views[0].up is None:

@@ -124,24 +124,19 @@ class AdaptationRecord:
         return next((n for n, trial in enumerate(self.told, start=1) if trial.hit), None)
 
     @property
-    def half_axes(self) -> Point:
-        """The tolerance of each component, in its unit."""
-        return self.format.half_axes
-
-    @property
     def distance_unit(self) -> str:
         """Of distances from the goal: that of all components, or `tolerances` where they differ."""
-        is_one = np.all(self.half_axes == self.half_axes[0])
+        is_one = len({*self.format.tolerance}) == 1
         return (self.unit() if is_one else "") or "tolerances"
 
     @property
     def edge(self) -> float:
         """The greatest distance that counts as reached, in `distance_unit`."""
-        return 1.0 if self.distance_unit == "tolerances" else float(self.half_axes[0]) * self.scale
+        return 1.0 if self.distance_unit == "tolerances" else self.format.tolerance[0] * self.scale
 
     def distance(self, error: Point) -> float:
         """How far an error is from the goal, in `distance_unit`."""
-        return self.edge * in_tolerances(error, self.half_axes)
+        return self.edge * in_tolerances(error, self.format.tolerance)
 
     def distance_seen(self, trial: Trial) -> float | None:
         """How far off a trial was seen to be, in `distance_unit`; None where nobody told."""
@@ -183,5 +178,5 @@ class AdaptationRecord:
         if trial.reading is None or not trial.reading.has_number:
             return None
         error = trial.reading.error_seen
-        off = in_tolerances(error, self.half_axes)
+        off = in_tolerances(error, self.format.tolerance)
         return self.goal + error / (max(off, 1.0) if trial.hit else 1.0)

@@ -65,28 +65,17 @@ def execute(
     show: Callable[[str], None] | None = None,
     stop_seen: int | None = None,
 ) -> MotionResult:
-    """Execute a trial's plan by a command or by the manifest's arm, once.
+    """Execute a trial's plan by a command or by the manifest's arm, as a person saw it, once.
 
-    A motion that is no trial is noted likewise, and the plan may be executed afterwards.
+    A motion that is no trial, which an arm alone makes, is noted likewise, and the plan may be
+    executed afterwards. `time_limit` is of a command, of an arm it is beyond the plan's own
+    duration, in [s]; `speed`, of a rehearsal, is a share of the plan's own. After a stop since
+    `stop_seen` (`last_stop` when it was asked for; now if not given), nothing begins.
 
-    Args:
-        workspace: The trial's.
-        number: The open trial.
-        command: For instance `mycontroller {plan} {result}`; or the arm, as a person saw it.
-        time_limit: Of the command, in [s]; of an arm, beyond the plan's own duration.
-        motion: An arm may also approach the plan's first frame, or rehearse it.
-        speed: Share of the plan's own speed, of a rehearsal.
-        show: Called with the command's output as it comes.
-        stop_seen: `last_stop` when it was asked for; after a stop since then, nothing begins.
-            Now if not given.
-
-    Raises:
-        TrialStateError: It was stopped since, executed already, is not open, or another program
-            executes one.
-        RobotLimitError: The plan breaks a limit of now; nothing moved.
-        ConfigurationError: The command could not be started; nothing moved, and the journal
-            says so.
-        KeyboardInterrupt: Interrupted; the command was stopped, and the journal says so.
+    TrialStateError if it was stopped since, executed already, is not open, or another program
+    executes one; RobotLimitError if the plan breaks a limit of now; ConfigurationError if the
+    command cannot be started: nothing moved then, and the journal says so. KeyboardInterrupt if it
+    was interrupted; the command was stopped, and the journal says so.
     """
     if (speed != 1.0) != (motion == "rehearsal") or not 0 < speed <= 1:
         raise ConfigurationError(

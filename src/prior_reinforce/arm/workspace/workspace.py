@@ -15,6 +15,7 @@ a session's: demonstrations imported, a model trained.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -85,7 +86,7 @@ class Workspace:
         self.read_manifest()
         self.store = Store(folder)
         self.log = Journal(folder, self.store)
-        self._read: dict[str, Demonstrations] = {}
+        self._stored = functools.cache(self.store.demonstrations)
 
     @classmethod
     def create(
@@ -437,8 +438,6 @@ class Workspace:
         return trained
 
     def _demonstrations(self, sha256: str) -> Demonstrations:
-        if sha256 not in self._read:
-            self._read[sha256] = self.store.demonstrations(sha256)
-        found = self._read[sha256]
+        found = self._stored(sha256)
         self.manifest.check_fit(found, "what was imported", self.folder / MANIFEST_FILE)
         return found
