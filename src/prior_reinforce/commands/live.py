@@ -17,7 +17,6 @@ from prior_reinforce.commands.questions import answer_to, until_read
 from prior_reinforce.errors import PerceptionFailedError, PriorReinforceError
 from prior_reinforce.parsing import from_words
 from prior_reinforce.readings import Reading
-from prior_reinforce.report.summary import headline
 from prior_reinforce.terminal import plain
 from prior_reinforce.wording import (
     error_example,
@@ -80,6 +79,8 @@ class LiveView:
 
     def summary(self, records: Sequence[AdaptationRecord]) -> None:
         """Print the count over all goals."""
+        from prior_reinforce.report.summary import headline
+
         said = headline(records)
         if len(records) > 1 and said.count:
             self._say((f"\n{said.text}", "bold"), f", on average {said.count}")
