@@ -6,9 +6,11 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.report.style import (
     HIT,
     calm_axes,
+    draw_joint,
     drawing,
     lay_out,
     new_figure,
@@ -73,6 +75,19 @@ def test_pictures_are_the_same_bytes_whatever_the_last_digit_of_their_layout(kin
     exact = save_figure(draw(ConstrainedLayoutEngine()), tmp_path / f"exact.{kind}")
     rounded = save_figure(draw(Rounds()), tmp_path / f"rounded.{kind}")
     assert exact.read_bytes() == rounded.read_bytes()
+
+
+def test_motions_of_other_lengths_are_drawn_over_one_joint_in_their_own_styles():
+    axes = new_figure(2, 2).subplots()
+    form = PlanFormat(("shoulder", "lift"), ("rad", "m"), 0.1)
+    motions = [
+        (np.array([0.0, 1.0]), np.array([[0.0, 3.0], [0.0, 4.0]]), {"linewidth": 1}),
+        (np.array([0.0, 0.5, 1.0]), np.array([[0.0, 5.0]] * 3), {"linewidth": 2}),
+    ]
+    draw_joint(axes, form, 1, motions, ", twice")
+    assert axes.get_title() == "lift [m], twice"
+    drawn = [(line.get_ydata().tolist(), line.get_linewidth()) for line in axes.lines]
+    assert drawn == [([3.0, 4.0], 1), ([5.0] * 3, 2)]
 
 
 def test_a_picture_that_cannot_be_drawn_leaves_the_one_before(tmp_path, monkeypatch):

@@ -317,7 +317,7 @@ def _draw(take: Take, form: PlanFormat, channels: list[int], kind: Which, path: 
     from prior_reinforce.report import style
 
     other = next(motion for motion in _MOTIONS if motion != kind)
-    drawn = [
+    drawn: list[style.TimedMotion] = [
         (take.t, take.motion(other, channels), {"color": style.INK_SOFT, "alpha": 0.5}),
         (take.t, take.motion(kind, channels), {"linewidth": 1.5}),
     ]

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from prior_reinforce.report.panels import View
+    from prior_reinforce.report.style import TimedMotion
 
 _COLUMNS = 4
 _LONGEST_NAME = 18
@@ -211,7 +212,7 @@ class Preview:
         starts = self.inspection.processed.starts
         changes, grey = self._changes(channel), {"color": "0.8", "linewidth": 2.5, "zorder": 1}
         recorded = zip(self.inspection.recordings, starts, strict=True)
-        drawn = [(each.times - start, each.positions, grey) for each, start in recorded]
+        drawn: list[TimedMotion] = [(r.times - start, r.positions, grey) for r, start in recorded]
         for plan, colour in zip(demos.plans, colours, strict=True):
             drawn.append((times, plan, {"color": colour, "linewidth": 1.1, "zorder": 2}))
             moving = np.flatnonzero(np.any(plan != plan[-1], axis=1))
