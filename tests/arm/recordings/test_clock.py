@@ -7,6 +7,7 @@ from prior_reinforce.arm.recordings.clock import (
     clock_of,
     declared_rate,
 )
+from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
@@ -22,11 +23,22 @@ def test_frames_without_times_need_a_rate():
         clock_of("a", 3)
 
 
-def test_a_given_rate_overrides_a_declared_one_and_says_so():
+def test_a_given_rate_agrees_with_a_declared_one_or_is_refused():
     assert clock_of("a", 3, name="fps", own_rate=50.0).source == "fps in the file"
-    clock = clock_of("a", 3, name="fps", own_rate=50.0, rate=100.0)
-    np.testing.assert_allclose(clock.times, [0, 0.01, 0.02])
-    assert clock.source == "the given rate (fps in the file says 50 Hz)"
+    clock = clock_of("a", 3, name="fps", own_rate=50.0, rate=51.0)
+    np.testing.assert_allclose(clock.times, [0.0, 1 / 51, 2 / 51])
+    with pytest.raises(ConfigurationError, match=r"--rate 100, but fps .* 50 .*--time-column none"):
+        clock_of("a", 3, name="fps", own_rate=50.0, rate=100.0)
+    unread = ReadOptions(rate=100.0, time_column="none").clock("a", 3, name="fps", own_rate=50.0)
+    np.testing.assert_allclose(unread.times, [0.0, 0.01, 0.02])
+    # At 5 frames an hour no arm is recorded.
+    assert clock_of("a", 3, name="dt", own_rate=1e-3 * 5, rate=20.0).period == pytest.approx(0.05)
+
+
+def test_of_two_declared_rates_the_given_one_is_taken():
+    both = {"dt": 0.02, "fps": 30}
+    assert declared_rate("a", both, given=30.0) == {"own_rate": 30, "rate_name": "fps"}
+    assert declared_rate("a", both, given=50.0)["rate_name"] == "dt"
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pyarrow.parquet as parquet
 import pytest
 
 from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
-from prior_reinforce.errors import FileFormatError
+from prior_reinforce.errors import ConfigurationError, FileFormatError
 from tests.arm.recordings.recorded import (
     AS_IS,
     JOINTS,
@@ -81,9 +81,13 @@ def test_other_times_of_lerobot_are_held_against_the_rate(tmp_path):
     recording = read_recordings(folder, time_column="observation.timestamp")[0]
     assert recording.period == pytest.approx(0.02)
     assert read_recordings(folder, time_column="timestamp")[0].period == pytest.approx(0.01)
-    assert read_recordings(folder, rate=50)[0].period == pytest.approx(0.02)
+    for rate in (50, 20):
+        with pytest.raises(ConfigurationError, match=rf"--rate {rate}, but fps .* 100 .*none"):
+            read_recordings(folder, rate=rate)
+        alone = read_recordings(folder, rate=rate, time_column="none")[0]
+        assert alone.period == pytest.approx(1 / rate)
     with pytest.raises(FileFormatError, match=r"observation\.timestamp steps by 0\.02"):
-        read_recordings(folder, rate=20)
+        read_recordings(folder, rate=100)
 
 
 @pytest.mark.parametrize("table", [True, False])

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from prior_reinforce.arm.recordings import read_recordings
+from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
 from prior_reinforce.arm.recordings.beside import moving_beside
 from prior_reinforce.errors import (
     ConfigurationError,
@@ -189,8 +189,10 @@ def test_the_rate_in_a_comment_holds_for_a_column_of_frames(tmp_path, said):
     path = table(tmp_path, "frame,a", [np.arange(60), SWING], above=f"# {said}")
     assert read_recordings(path)[0].period == pytest.approx(0.025)
     assert read_recordings(path, rate=40)[0].period == pytest.approx(0.025)
-    with pytest.raises(ConfigurationError, match=r"says 40 frames a second by its .*drop"):
+    with pytest.raises(ConfigurationError, match=r"in the file says 40 frames .*drop"):
         read_recordings(path, rate=100)
+    unread = read_recordings(path, rate=100, time_column="none")[0]
+    assert unread.period == pytest.approx(0.01)
     skipping = np.delete(np.arange(61), 30)
     path = table(tmp_path, "frame,a", [skipping, SWING], above=f"# {said}")
     assert read_recordings(path)[0].duration == pytest.approx(1.5)
@@ -201,11 +203,27 @@ def test_a_column_of_one_number_that_is_a_rate_is_that_of_the_frames(tmp_path, h
     path = table(tmp_path, f"a,{head}", [SWING, np.full(60, number)])
     assert read_recordings(path, joints=["a"])[0].period == pytest.approx(0.025)
     if head != "dt_ms":  # else it is summed, and held against the rate as times are
-        with pytest.raises(ConfigurationError, match=f"says 40 .* by its {head}.*drop --rate"):
+        with pytest.raises(ConfigurationError, match=f"{head} in the file says 40 .*drop --rate"):
             read_recordings(path, joints=["a"], rate=100)
     for other in ("freq", "Freq_Hz"):  # of the swing
         path = table(tmp_path, f"a,{other}", [SWING, np.full(60, 20)])
         assert read_recordings(path, joints=["a"], rate=100)[0].period == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("name", ["frame", "frame_index", "step", "seq", "sample"])
+def test_a_counter_of_frames_is_no_clock_whatever_its_steps(tmp_path, name):
+    path = table(tmp_path, f"{name},a", [10 * np.arange(60), SWING])  # ms, at 100 a second?
+    for options in ({"time_column": name}, {"rate": 100.0}):
+        with pytest.raises(
+            UnclearUnitsError, match=r"counts frames, 10 at a time.*--time-unit frame --rate HZ"
+        ):
+            import_demonstrations(path, outcomes={"0": [1.0, 0.0]}, joints=["a"], **options)
+    frames = read_recordings(path, joints=["a"], time_unit="frame", rate=100.0)[0]
+    assert frames.period == pytest.approx(0.1)
+    rows = read_recordings(path, joints=["a"], time_column="none", rate=100.0)[0]
+    assert rows.period == pytest.approx(0.01)
+    said = read_recordings(path, joints=["a"], time_column=name, time_unit="ms")[0]
+    assert said.period == pytest.approx(0.01)
 
 
 def test_a_rate_in_a_comment_says_nothing_against_times(tmp_path):

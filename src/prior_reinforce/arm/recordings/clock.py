@@ -13,7 +13,6 @@ import numpy as np
 
 from prior_reinforce.arm.recordings.naming import OTHER_NAMES
 from prior_reinforce.arm.recordings.time_finder import (
-    COUNTER,
     FRAME,
     Columns,
     FoundTimes,
@@ -21,6 +20,7 @@ from prior_reinforce.arm.recordings.time_finder import (
     Times,
     are_ticks,
     find_times,
+    is_counter,
     is_frame_rate,
     is_periods,
     is_throw,
@@ -70,7 +70,8 @@ def declared_rate(
     """Return the rate that a file declares, if any, as `clock_of` takes it.
 
     `said` are its numbers by name, for instance `fps` 50 or `dt_ms` 20, or by their place deep in
-    it, `meta.fps`; these count less. FileFormatError if two differ, and no rate is given.
+    it, `meta.fps`; these count less. FileFormatError if two differ, and no rate is given that one
+    of them says.
     """
     found: dict[str, float] = {}
     for name, value in sorted(said.items(), key=lambda item: "." in item[0]):
@@ -85,7 +86,8 @@ def declared_rate(
             )
         number = float(value) * base_of(unit or "s")[1]
         found[name] = 1 / number if is_period and number else number
-    first, of_first = next(iter(found.items()), ("", 0.0))
+    agree = [own for own in found.items() if given is not None and _same(given, own[1])]
+    first, of_first = next(iter((*agree, *found.items())), ("", 0.0))
     for name, rate in found.items():
         if given is None and not _same(rate, of_first):
             raise FileFormatError(
@@ -134,7 +136,8 @@ def clock_of(
         unit: Unit that the format fixes for them; None reads it from the name, or infers it.
         own_rate: Rate that the file declares, in [Hz]; the stamps must agree with it.
         rate_name: What the file calls that rate.
-        rate: Rate that the user gave. It overrides a declared one, and must agree with stamps.
+        rate: Rate that the user gave. It must agree with stamps, and with a declared one that may
+            be.
         time_unit: Unit that the user gave, one of `TIME_UNITS`.
 
     Raises:
@@ -160,13 +163,17 @@ def clock_of(
                 "second: --rate"
             )
         times = np.arange(count) / own
+        doubts = () if own_rate is None else _doubt_rate(name, own_rate, count)
         if rate is None:
-            return Clock(times, f"{name} in the file", _doubt_rate(name, own, count))
-        stated, by = own_rate, f"{name} in the file"
-        if stated is None and (in_name := _HERTZ.search(episode)):
-            stated, by = float(in_name[1].replace(",", ".")), f"the name {episode}"
-        differs = stated is not None and not _same(rate, stated)
-        said = f" ({by} says {stated:g} Hz)" if differs else ""
+            return Clock(times, f"{name} in the file", doubts)
+        if own_rate is not None and not doubts and not _same(rate, own_rate):
+            raise ConfigurationError(
+                f"--rate {rate:g}, but {name} in the file says {own_rate:.4g} frames a second; "
+                "drop --rate, or leave the file's rate unread: --time-column none"
+            )
+        in_name = _HERTZ.search(episode)
+        stated = float(in_name[1].replace(",", ".")) if in_name else rate
+        said = "" if _same(rate, stated) else f" (the name {episode} says {stated:g} Hz)"
         return Clock(times, f"the given rate{said}")
     try:
         numbers = np.asarray(stamps, dtype=np.float64)
@@ -182,6 +189,9 @@ def clock_of(
     known = unit or split_unit(name, SECONDS)[1]
     known, of_one = without_number(known) if known else (None, 1.0)  # of `t [0.1 ms]`
     numbers = numbers * of_one
+    counts = not known and time_unit is None and is_counter(name, numbers)
+    if counts and (rate or own_rate) and np.all(np.diff(numbers) == 1):
+        known = FRAME
     if known is None and time_unit is None and are_ticks(numbers):
         numbers, known = (numbers - numbers[0]) * 100, "ns"
     unknown = None if known or time_unit else _IN_BRACKETS.search(name)
@@ -223,6 +233,8 @@ def clock_of(
                 f"{name} is in {known}, but --time-unit says {time_unit}; drop it"
             )
         chosen, ambiguities = _judge(name, period, numbers, time_unit, "--time-unit says")
+    elif counts and ambiguities:
+        return Clock(elapsed * SECONDS[chosen], f"{name} in {chosen}", ambiguities)
     elif known is None and period > 0 and (at := rate or own_rate):
         # A rate that agrees in one unit settles it.
         agrees = [u for u, scale in SECONDS.items() if _same(at, 1 / (period * scale))]
@@ -384,19 +396,19 @@ def _judge(
         what += f", which no throw is; it looks like key frames in {unit}"
         return unit, (Ambiguity(what, f"--time-unit {unit}"),)
     what += f": it looks like {looks}"
-    is_counter = COUNTER.search(name.lower()) is not None
-    is_time = says_time(name) or name.lower() in SECONDS
-    brief = numbers[0] in (0, 1) and length * SECONDS[looks] < _BRIEF
-    if said is None and period == 1 and (is_counter or brief or not is_time):
-        what = f"{name} counts frames, and nothing says how many a second are"
-        what += f" (or it is a time: --time-unit {looks})" * (not is_counter)
-        return "s", (Ambiguity(what, "--time-unit frame --rate HZ", guessed=False),)
-    if said is None and period == 1:
-        what += " (or it counts frames: --time-unit frame --rate HZ)"
-    elif said is None and "tick" in name.lower() and is_frame_rate(1e7 / period):
+    if said is None and "tick" in name.lower() and period != 1 and is_frame_rate(1e7 / period):
         what = f"{name} steps by {period:g}, and nothing says how long a tick is"
         what += " (.NET's are 100 ns: then write that column in ns, times 100)"
         return "s", (Ambiguity(what, "--time-unit UNIT", guessed=False),)
+    counts, is_time = is_counter(name, numbers), says_time(name) or name.lower() in SECONDS
+    brief = numbers[0] in (0, 1) and length * SECONDS[looks] < _BRIEF
+    if said is None and (counts or (period == 1 and (brief or not is_time))):
+        steps = f", {period:g} at a time" if period != 1 else ""
+        what = f"{name} counts frames{steps}, and nothing says how many a second are"
+        what += f" (or it is a time: --time-unit {looks})" * (period != 1 or not counts)
+        return "s", (Ambiguity(what, "--time-unit frame --rate HZ", guessed=False),)
+    if said is None and period == 1:
+        what += " (or it counts frames: --time-unit frame --rate HZ)"
     return looks, (Ambiguity(what, f"--time-unit {looks}"),)
 
 

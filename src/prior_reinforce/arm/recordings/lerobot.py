@@ -142,8 +142,7 @@ def _clock(
     asked = options.time_column not in (None, NO_COLUMN)
     stamps = clocks.get(_STAMPS, index / rate)
     late = np.abs(stamps - stamps[0] - (index - index[0]) / rate).max() > _LATE / rate
-    # With a rate from the command line, stamps are asked for by name only.
-    if asked or (late and options.rate is None and options.time_column is None):
+    if asked or (late and options.time_column is None):
         return clock_among(source, episode, len(index), clocks, options, {"fps": rate})
     clock = options.clock(episode, len(index), rate_name="fps", own_rate=rate)
     clock = replace(clock, times=index * clock.period)

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from prior_reinforce.arm.recordings.clock import TIME_UNITS, Clock, clock_of
+from prior_reinforce.arm.recordings.clock import NO_COLUMN, TIME_UNITS, Clock, clock_of
 from prior_reinforce.arm.recordings.tables import DELIMITERS
 from prior_reinforce.errors import ConfigurationError
 
@@ -92,4 +92,6 @@ class ReadOptions:
 
     def clock(self, episode: str, count: int, **of_file: Any) -> Clock:
         """Return an episode's times from these options and what the file says (`clock_of`)."""
+        if self.time_column == NO_COLUMN and self.rate is not None:
+            of_file.pop("own_rate", None)
         return clock_of(episode, count, rate=self.rate, time_unit=self.time_unit, **of_file)

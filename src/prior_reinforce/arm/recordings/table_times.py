@@ -12,7 +12,6 @@ import numpy as np
 
 from prior_reinforce.arm.recordings.clock import (
     NO_COLUMN,
-    SAME_RATE,
     Clock,
     clock_at,
     declared_rate,
@@ -51,10 +50,7 @@ _THOUSAND = re.compile(r"\d{1,3}([.,]\d{3})+")
 
 
 def _declared(table: Table, options: ReadOptions) -> dict[str, Any]:
-    """The rate that comments or a column of one number declare, for `clock_of`.
-
-    ConfigurationError if another is given.
-    """
+    """The rate that comments or a column of one number declare, for `clock_of`."""
     said = {
         name: float(own[0])
         for name, own in zip(table.names, table.values.T, strict=True)
@@ -66,14 +62,7 @@ def _declared(table: Table, options: ReadOptions) -> dict[str, Any]:
             if of_time or unit.lower() in ("", "hz", "khz", "fps"):
                 scale = 1000 if unit.lower() == "khz" else 1
                 said[f"{name}_{unit}" if of_time else name] = float(number) * scale
-    found = declared_rate(table.where, said, options.rate)
-    own, rate = found.get("own_rate"), options.rate
-    if own and rate and abs(own - rate) > SAME_RATE * own:
-        raise ConfigurationError(
-            f"{table.where} says {own:g} frames a second by its {found['rate_name']}, but --rate "
-            f"{rate:g}; drop --rate, or correct the file"
-        )
-    return found
+    return declared_rate(table.where, said, options.rate)
 
 
 def with_whole_dates(table: Table) -> Table:

@@ -176,6 +176,17 @@ def says_time(name: str) -> bool:
     return _SAYS_TIME.search(spaced) is not None
 
 
+def is_counter(name: str, values: Stamps) -> bool:
+    """Whether a column of whole numbers says that it counts frames; ticks are mostly of a clock."""
+    said = COUNTER.search(name.lower())
+    return (
+        said is not None
+        and said[2] != "tick"
+        and not says_time(name)
+        and bool(np.all(values % 1 == 0))
+    )
+
+
 def says_period(name: str) -> bool:
     """Whether a name says that it is the time from one frame to the next: `dt`, `period_ms`."""
     return _PERIOD.fullmatch(split_unit(name, SECONDS)[0].strip().lower()) is not None
