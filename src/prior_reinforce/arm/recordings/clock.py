@@ -405,7 +405,9 @@ def _judge(
     if said is None and (counts or (period == 1 and (brief or not is_time))):
         steps = f", {period:g} at a time" if period != 1 else ""
         what = f"{name} counts frames{steps}, and nothing says how many a second are"
-        what += f" (or it is a time: --time-unit {looks})" * (period != 1 or not counts)
+        if period != 1 or not counts:
+            what += f" (or it is a time: --time-unit {looks}"
+            what += "; or say it of the rows: --time-column none --rate HZ)" if counts else ")"
         return "s", (Ambiguity(what, "--time-unit frame --rate HZ", guessed=False),)
     if said is None and period == 1:
         what += " (or it counts frames: --time-unit frame --rate HZ)"
