@@ -216,7 +216,7 @@ def test_a_counter_of_frames_is_no_clock_whatever_its_steps(tmp_path, name):
     for options in ({"time_column": name}, {"rate": 100.0}):
         with pytest.raises(
             UnclearUnitsError,
-            match=r"counts frames, 10 at a.*ms; or.* --time-column none.*--time-unit frame --rate HZ",
+            match=r"10 at a time.*ms; or.* --time-column none.*--time-unit frame --rate HZ",
         ):
             import_demonstrations(path, outcomes={"0": [1.0, 0.0]}, joints=["a"], **options)
     frames = read_recordings(path, joints=["a"], time_unit="frame", rate=100.0)[0]
