@@ -8,7 +8,7 @@ import pytest
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.selection import select
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
-from tests.arm.recordings.recorded import takes
+from tests.arm.recordings.recorded import JOINTS, sampled, takes
 
 T = np.arange(100) * 0.01
 
@@ -75,6 +75,19 @@ def test_a_read_may_fail_in_the_first_frame_of_a_locked_joint_and_of_a_gripper(
     q[list(frames), names.index(channel)] = fill
     with pytest.raises(InvalidDemonstrationsError, match=rf"{channel} is .* write nan there"):
         select([replace(told, positions=q)])
+
+
+@pytest.mark.parametrize(("rate", "frames"), [(20, 1), (20, 6), (100, 3), (500, 1)])
+def test_frames_of_nothing_but_0_amid_a_motion_were_not_read(rate, frames):
+    t, q = sampled(1, rate)
+    first = round(0.8 * rate)
+    lost = q.copy()
+    lost[first : first + frames] = 0.0
+    said = rf"joint1 to joint7 are 0 in {frames} of .* first in {first}, .* write nan there"
+    with pytest.raises(InvalidDemonstrationsError, match=said):
+        select([Recording("7", t, lost, JOINTS)])
+    through_0 = select([Recording("7", t, q - q[first], JOINTS)])
+    assert len(through_0.recordings[0].times) == len(t)
 
 
 @pytest.mark.parametrize(

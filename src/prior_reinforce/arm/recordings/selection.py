@@ -40,8 +40,12 @@ _MOST_LOST = 0.1
 where more is missing, the recorder failed."""
 _LIKE_RATES = "look like velocities, torques or the like"
 _BEYOND = 5.0
-"""A few frames that are so many times as large as all others were not read. Ours: a motion passes
-through what lies between."""
+"""A few frames that are so many times as large, or lead so many times as far, as all others were
+not read. Ours: a motion passes through what lies between."""
+_NOT_READ = (
+    "as where a read failed: write nan there, so that they are left out as lost frames are, or "
+    "leave that episode out (--leave-out)"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -315,9 +319,31 @@ def _refuse_failed_reads(
             raise InvalidDemonstrationsError(
                 f"episode {episode}: {called[i]} is {positions[far[0], i]:.4g} in {len(far)} of "
                 f"{len(size)} frames, first in {far[0]}, and {rest[i]:.4g} at most in all others, "
-                "as where a read failed: write nan there, so that they are left out as lost frames "
-                "are, or leave that episode out (--leave-out)"
+                f"{_NOT_READ}"
             )
+
+
+def _refuse_empty_frames(episode: str, positions: np.ndarray, joints: Sequence[str]) -> None:
+    """Refuse frames of nothing but 0 amid a motion, such as a recorder's lost packets are.
+
+    All that moves leaps there and back, farther than ever else.
+    """
+    ranges = np.ptp(positions, axis=0)
+    moves = [
+        i
+        for i, (name, kind) in enumerate(zip(joints, kinds(joints), strict=True))
+        if ranges[i] > 0 and kind not in (*RATES, Kind.TOOL) and not is_increment(name)
+    ]
+    empty = np.all(positions[:, moves] == 0, axis=1)
+    if len(moves) < 2 or not 0 < empty.sum() < len(empty) / 2 or empty[0] or empty[-1]:
+        return
+    steps = np.abs(np.diff(positions[:, moves], axis=0) / ranges[moves]).max(axis=1)
+    leaps = empty[1:] != empty[:-1]
+    if steps[leaps].min() > _BEYOND * steps[~leaps].max():
+        raise InvalidDemonstrationsError(
+            f"episode {episode}: {say_names([joints[i] for i in moves])} are 0 in {empty.sum()} of "
+            f"{len(empty)} frames, first in {empty.argmax()}, and leap there and back, {_NOT_READ}"
+        )
 
 
 def _picked(recording: Recording, columns: list[int], joints: tuple[str, ...]) -> Recording:
@@ -337,6 +363,7 @@ def _picked(recording: Recording, columns: list[int], joints: tuple[str, ...]) -
         count = "frame is" if lost.sum() == 1 else "frames are"
         remarks += (f"{what}; {lost.sum()} {count} left out, as lost packets are",)
     _refuse_failed_reads(recording.episode, called, positions[~lost], joints)
+    _refuse_empty_frames(recording.episode, positions[~lost], joints)
     units = zip(recording.columns, recording.units, strict=True)
     names = [name + (f" [{unit}]" if unit else "") for name, unit in units]
     beside = columns_beside(names, recording.positions, columns, recording.times)
