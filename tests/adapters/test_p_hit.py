@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+import scipy.special
+from scipy.special import ndtr
 from scipy.stats import norm
 
 from prior_reinforce.adapters.p_hit import Belief, Targets, p_hit_after, share_within
@@ -127,3 +129,20 @@ def test_each_component_is_a_mixture_of_its_own(k):
     samples = rng.normal(mean[model, np.arange(k)], sd[model, np.arange(k)])
     distance = np.linalg.norm(samples, axis=1)
     np.testing.assert_allclose(said, [np.mean(distance < r) for r in (0.1, 0.2)], atol=0.005)
+
+
+@pytest.mark.parametrize(("k", "off"), [(3, 0.005), (4, 0.08)])
+def test_a_hundred_candidates_share_the_cells_of_one_and_the_best_stays_the_best(
+    k, off, monkeypatch
+):
+    asked = []
+    monkeypatch.setattr(scipy.special, "ndtr", lambda x, own=ndtr: asked.append(x.size) or own(x))
+    rng = np.random.default_rng(0)
+    mean, share = rng.normal(size=(5, k, 100)), rng.dirichlet(np.ones(5), size=k).T
+    sd = 0.1 * rng.uniform(0.5, 1.5, size=mean.shape)
+    together = share_within(mean, sd, share)
+    work = sum(asked)
+    alone = [share_within(mean[..., [i]], sd[..., [i]], share)[0] for i in range(100)]
+    np.testing.assert_allclose(together, alone, atol=off)
+    assert together.argmax() == np.argmax(alone)
+    assert work < 0.1 * (sum(asked) - work)
