@@ -28,7 +28,8 @@ class ReadOptions:
     of an HDF5 data set inside an episode, topic of a bag. If not given, the only candidate; give
     it again for what is stored beside it, such as a gripper's opening."""
     rate: float | None = None
-    """Frames per second, for a source without times; if it has times, they must agree."""
+    """Frames per second, for a source without times; those that it has, and its own rate, must
+    agree."""
     time_unit: Literal["s", "ms", "us", "ns", "min", "h", "day", "frame"] | None = None
     """Unit of the recorded times, if their name does not give it (`t_ms`); `frame` for a column
     that counts frames."""
