@@ -200,6 +200,16 @@ def test_beyond_a_range_are_degrees():
     assert (joints.option, joints.guessed) == ("--units deg deg deg percent", True)
 
 
+@pytest.mark.parametrize(
+    ("largest", "option"),
+    [((2300, 1700, 550), "--units UNIT"), ((80, 60, 1700), "--units deg deg UNIT")],
+)
+def test_a_joint_beside_others_in_no_known_unit_is_not_in_degrees(largest, option):
+    for names, units in ((("joint1", "joint2", "joint3"), None), (("a1", "a2", "a3"), ["rad"] * 3)):
+        doubts = select(takes(names, largest), plan_units=units).ambiguities
+        assert {one.option for one in doubts} == {option}
+
+
 def test_one_unit_of_a_plan_holds_for_all_joints():
     found = select(takes(SO101, (20, -53, 40, 70)), plan_units=("percent",), normalised=True)
     assert (found.units, found.ambiguities) == (("percent",) * 4, ())

@@ -206,6 +206,8 @@ class Judge:
     def _is_beyond(self, one: Belief) -> Doubt | None:
         """A number beyond what arms do is in another unit; an angle with those that share it."""
         looks, why = self._looks(one), _NOT_DONE
+        if one in self.far and self._is_of_no_unit(self.far):
+            return Doubt(UNIT, why)
         if looks == one.unit:
             return Doubt("deg", why) if one in self.far and looks != "deg" else None
         if one in self.far and self._counts_turns(self.far):
@@ -220,6 +222,10 @@ class Judge:
                     "range has 100: say its own unit, or counts for a number without a unit"
                 )
         return Doubt(looks or UNIT, why)
+
+    def _is_of_no_unit(self, alike: Sequence[Belief]) -> bool:
+        """Whether most that share a unit are beyond all units: so no other is in degrees."""
+        return 2 * sum(self._looks(one) is None for one in alike) > len(alike)
 
     @cached_property
     def _one_option(self) -> bool:
