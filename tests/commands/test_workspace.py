@@ -214,6 +214,16 @@ def test_a_joint_is_held_somewhere(run, tmp_path, held):
     assert "lift=0.2" in err
 
 
+def test_a_joint_is_held_at_one_place(run, tmp_path):
+    path = mounted(tmp_path, (0.0, 0.0, 0.1), lift=True)
+    new = ("new", tmp_path / "w", "--robot", path, "--hold")
+    status, _, err = run(*new, "lift=0.2", "lift=0.3")
+    assert status == 2
+    assert "lift" in err
+    assert not (tmp_path / "w").exists()
+    assert run(*new, "lift=0.2")[0] == 0
+
+
 def mounted(tmp_path, xyz, rpy=(0.0, 0.0, 0.0), lift=False):
     """An arm on a mount, which may be on a lift; its first joint turns about the mount's z."""
     level, up = (0.0, 0.0, 0.0), (0.0, 0.0, 0.2)

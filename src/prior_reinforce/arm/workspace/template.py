@@ -143,11 +143,13 @@ class NewWorkspace:
         """Return the joints that stand still, and where.
 
         Raises:
-            ConfigurationError: One is not name=number.
+            ConfigurationError: One is not name=number, or is said twice.
         """
         held = dict[str, float]()
         for said in self.hold:
             name, _, position = said.rpartition("=")
+            if name in held:
+                raise ConfigurationError(f"--hold says twice where {name} stands; say it once")
             try:
                 held[name] = float(position)
             except ValueError:
