@@ -118,7 +118,7 @@ def test_about_the_base_a_turned_path_is_the_first_joint_turned():
 def test_a_path_beyond_reach_is_refused_with_the_angle_and_the_error():
     q = np.tile([0.0, 0.9, 0.0, -0.6, 0.0, 1.5, 0.8], (10, 1))
     with pytest.raises(
-        OutOfReachError, match=r"out of reach: turned by 1.5 rad about \(0.2, 0.4\)"
+        OutOfReachError, match=r"turned by 1.5 rad about \(0.2, 0.4\) m.*; demonstrate nearer"
     ):
         turned_path(FRANKA, q, 1.5, (0.2, 0.4))
 

@@ -37,7 +37,7 @@ def refusal(generator: Generator, goal: ArrayLike, check: Check) -> str:
         place = np.asarray(goal, dtype=np.float64)
         (plan,) = generator.generate(place[None])
     except OutOfReachError as error:
-        return str(error)
+        return str(error).partition("; ")[0]  # who asked says what to do
     return check(plan, place)
 
 
@@ -62,7 +62,9 @@ class Reach:
             return wanted
         possible = self.goals[self.reached]
         if not len(possible):
-            raise OutOfReachError(f"no goal can be reached from these demonstrations: {why}")
+            raise OutOfReachError(
+                f"no goal can be reached from these demonstrations: {why}; give others"
+            )
         within = possible[np.argmin(np.linalg.norm(possible - wanted, axis=1))]
         return farthest_between(generator, within, wanted, check, said)
 

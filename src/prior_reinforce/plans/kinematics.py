@@ -193,7 +193,7 @@ def turned_path(
     worst = int(np.argmax((np.abs(off) / allowed).max(axis=1)))
     if np.any(np.abs(off[worst]) > allowed):
         raise OutOfReachError(
-            f"out of reach: turned by {angle:.3g} rad about ({centre[0]:g}, {centre[1]:g}) m, "
+            f"turned by {angle:.3g} rad about ({centre[0]:g}, {centre[1]:g}) m, "
             f"frame {worst} is {np.abs(off[worst, :3]).max():.2g} m and "
             f"{np.abs(off[worst, 3:]).max():.2g} rad away from where the arm comes; "
             "demonstrate nearer to the goal"
