@@ -21,9 +21,9 @@ Places = Float[np.ndarray, "*n 3"]
 """As many points in the base frame, [m]."""
 Pose = tuple[float, float, float, float, float, float]
 """x, y, z in [m] and roll, pitch, yaw in [rad], as in URDF: R = Rz(yaw) Ry(pitch) Rx(roll)."""
-UPRIGHT = 0.05
+UPRIGHT = math.radians(3.0)
 """How far an axis may lean and be taken for vertical, [rad]. Ours: it makes a turned motion differ
-by that share of a distance, as much as plans are believed to be off by anyway (`offset_sd`)."""
+by 5 % of a distance, as much as plans are believed to be off by anyway (`offset_sd`)."""
 _Z = (0.0, 0.0, 1.0)
 _HELD = 1e-3
 """A joint that moves less than this in a path is held, [rad] (ours)."""

@@ -297,7 +297,7 @@ def leaning(by):
 UR_FORM = PlanFormat(tuple("abcdef"), ("rad",) * 6, 0.01)
 
 
-@pytest.mark.parametrize("lean", [0.002, 0.01, 0.04, np.pi - 0.01])
+@pytest.mark.parametrize("lean", [0.002, 0.01, 0.04, np.radians(2.99), np.pi - 0.01])
 def test_a_mount_that_leans_a_little_is_turned_by_its_first_joint(lean):
     chain = leaning(lean)
     symmetry = declare_symmetry(UR_FORM, 2, about="base", chain=chain, joints=range(6))
@@ -312,8 +312,17 @@ def test_a_mount_that_leans_a_little_is_turned_by_its_first_joint(lean):
 
 @pytest.mark.parametrize("lean", [0.06, np.pi - 0.06])
 def test_a_mount_that_leans_by_more_is_refused(lean):
-    with pytest.raises(ConfigurationError, match=r"leans by 3 degrees"):
-        declare_symmetry(UR_FORM, 2, about="base", chain=leaning(lean), joints=range(6))
+    arm = {"chain": leaning(lean), "joints": range(6)}
+    with pytest.raises(ConfigurationError, match=r"leans by 3\.44 degrees.*--symmetry \"0 0\""):
+        declare_symmetry(UR_FORM, 2, about="base", **arm)
+    turned = declare_symmetry(UR_FORM, 2, about=(0.0, 0.0), **arm)
+    assert turned.moves[1].centre == (0.0, 0.0)
+    plan = np.tile([0.2, -1.0, 1.5, -1.0, -1.5, 0.3], (3, 1))
+    places = [
+        tool_tip(arm["chain"], each) for each in (plan, turned.move(plan, np.array([0.0, 0.3])))
+    ]
+    turn = rotation(0.0, 0.0, 0.3)
+    np.testing.assert_allclose(places[1], places[0] @ turn.T, atol=1e-3)
 
 
 def test_a_place_on_the_first_axis_is_turned_about_by_that_joint():

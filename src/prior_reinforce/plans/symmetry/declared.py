@@ -287,9 +287,10 @@ def _first_joint(chain: Chain) -> tuple[float, tuple[float, float]]:
     lean = leaning(along)
     if lean > UPRIGHT:
         raise ConfigurationError(
-            f"the first joint's axis leans by {np.degrees(lean):.0f} degrees from the vertical (z "
-            "of the base frame), and no turn of that joint leaves the physics unchanged; name a "
-            'place (x, y) to turn about instead, --symmetry "X Y"'
+            f"the first joint's axis leans by {np.degrees(lean):.3g} degrees from the vertical (z "
+            "of the base frame), and no turn of that joint leaves the physics unchanged; mend the "
+            "lean if the arm stands upright, or leave the symmetry out and give demonstrations all "
+            'around, or, with six joints, turn the whole motion about the base: --symmetry "0 0"'
         )
     return float(np.sign(along[2])), (x, y)
 
