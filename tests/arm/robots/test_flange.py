@@ -41,6 +41,16 @@ READ = {
         "tool0",
         ("pan", "tilt"),
     ),
+    "a screwdriver behind flange": (
+        [*six(), fixed("t", "flange"), J("bit_joint", "bit", "continuous")],
+        "flange",
+        ("bit_joint",),
+    ),
+    "a link called tool0 within the arm, and flange": (
+        [*six(n=4), fixed("f", "tool0"), *arm(SIX[4:], LINKS[4:]), fixed("t", "flange")],
+        "flange",
+        (),
+    ),
     "a pedestal called flange": ([fixed("p", "flange"), *six(of="flange")], "link6", ()),
     "a link called flange within the arm, and tool0": (
         [*six(n=4), fixed("f", "flange"), *arm(SIX[4:], LINKS[4:]), fixed("t", "tool0")],
@@ -138,10 +148,23 @@ ASKED = {
         "link6",
         None,
     ),
-    "joints behind a link called flange": (
-        [*six(n=4), fixed("f", "flange"), *arm(SIX[4:], LINKS[4:])],
-        "flange",
+    **{
+        f"joints behind a link called {tip}": (
+            [*six(n=4), fixed("f", tip), *arm(SIX[4:], LINKS[4:])],
+            tip,
+            "link6",
+        )
+        for tip in ("flange", "tool0", "link_eef")
+    },
+    "joints beside a link called tool0": (
+        [*six(), fixed("f", "tool0", of="link3")],
+        "tool0",
         "link6",
+    ),
+    "joints behind a link called flange, of which no name tells": (
+        [*doubtful(["basis", "schulter", "oberarm"]), fixed("f", "flange"), J("hand", "palm")],
+        "flange",
+        "palm",
     ),
 }
 

@@ -197,13 +197,20 @@ class Tree:
         """Bodies in which arms may end: none turns behind them, or what does is a tool."""
         bodies = [*self.depth][1:]
         carrying = {self._before(body) for body in bodies}
-        # `flange` is a word that links within an arm have, too.
-        ended = {body for body, tip in self.tips.items() if not tip.endswith("flange")}
+        # Links within an arm are called so, too.
+        ended = self.tips.keys() - {self._before(body) for body in bodies if self._goes_on(body)}
         behind = set[str]()
         for body in bodies:
             if self._before(body) in ended | behind:
                 behind.add(body)
         return [b for b in bodies if b not in behind and (b in ended or b not in carrying)]
+
+    def _goes_on(self, body: str) -> bool:
+        """Whether the joint before a body is behind a convention's link, and may be the arm's."""
+        if self._before(body) not in self.tips:
+            return False
+        *names, last = [self.moving[each].name for each in self._way(body)]
+        return not arms_own(names) == len(names) == arms_own([*names, last])
 
     def _before(self, body: str) -> str:
         return self.body[self.moving[body].parent]
