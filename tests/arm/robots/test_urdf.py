@@ -350,9 +350,9 @@ def test_a_base_link_stands_upright_in_its_heading_however_it_is_mounted(
     expected = tool_tip(whole.chain, q, TIP) - stands
     turn = rotation(0.0, 0.0, heading)
     np.testing.assert_allclose(tool_tip(above.chain, q, TIP) @ turn.T, expected, atol=2e-4)
-    tilted = abs(rpy[0]) + abs(rpy[1]) > 0.1
-    assert ("from base (z as in world) to" in above.source) == tilted
-    assert tilted or "from base to" in above.source
+    tilted, steep = abs(rpy[0]) + abs(rpy[1]) > 0.1, abs(rpy[1]) > 1.0
+    axes = " (x and z as in world)" if steep else " (z as in world)" * tilted
+    assert f"from base{axes} to" in above.source
 
 
 def test_bases_are_links_by_which_the_first_axis_passes(tmp_path):
@@ -364,6 +364,15 @@ def test_bases_are_links_by_which_the_first_axis_passes(tmp_path):
     path.write_text(Urdf("mounted", joints, root="world").text())
     assert bases_on_axis(path, None, None, {}, 0.001) == ("world", ["base"])
     assert bases_on_axis(path, None, "base", {}, 0.001) == ("base", [])
+
+
+def test_no_base_is_advised_that_a_joint_below_would_turn(tmp_path):
+    level = {"rpy": (0.0, 0.0, 0.0)}
+    steep = fixed("steep", "plate", rpy=(0.0, np.pi / 2, 0.0))
+    joints = [J("waist", "torso", **level), steep, *arm(["a", "b"], **level)]
+    path = tmp_path / "arm.urdf"
+    path.write_text(Urdf("mounted", joints).text())
+    assert bases_on_axis(path, None, "torso", {}, 0.001) == ("torso", [])
 
 
 def test_a_slide_between_an_arms_own_joints_offers_no_base_behind_them(tmp_path):
@@ -409,6 +418,34 @@ def test_a_joint_is_held_in_its_own_range(tmp_path, hold, says):
     else:
         with pytest.raises(ConfigurationError, match=says):
             read_urdf(path, "c_link", hold=hold)
+
+
+@pytest.mark.parametrize(
+    ("axis", "rpy", "mount", "matters"),
+    [
+        ((0.0, 0.0, 1.0), (0.0, 0.0, 0.3), (0.0, 0.0, 0.0), False),  # a waist that yaws
+        ((0.0, 0.0, -1.0), (0.0, 0.0, 0.3), (np.pi, 0.0, 0.2), False),  # above it, a ceiling
+        ((0.0, 1.0, 0.0), (0.0, 0.0, 0.3), (0.0, 0.0, 0.0), True),  # one that pitches
+        ((0.0, 0.0, 1.0), (0.2, 0.0, 0.0), (0.0, 0.0, 0.0), True),  # that yaws, and leans
+        ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, np.pi / 2, 0.0), True),  # under a link's steep x
+    ],
+)
+def test_a_joint_that_would_turn_the_base_is_held_somewhere(tmp_path, axis, rpy, mount, matters):
+    waist = J("waist", "torso", axis=axis, rpy=rpy)
+    follower = J("level", "levelled", axis=axis, rpy=(0.0, 0.0, 0.0), more='<mimic joint="waist"/>')
+    for joints in ([waist], [waist, follower]):
+        path, base = tmp_path / "arm.urdf", fixed("m", "base", rpy=mount)
+        path.write_text(Urdf("waist", [*joints, base, *arm(["a", "b"])]).text())
+        if not matters:
+            assert read_urdf(path, base="base").joint_names == ("a", "b")
+            continue
+        with pytest.raises(ConfigurationError, match=r"waist stands before .*--hold waist=0$"):
+            read_urdf(path, base="base")
+        tips = [
+            tool_tip(read_urdf(path, base="base", hold={"waist": at}).chain, np.array([0.2, 0.4]))
+            for at in (0.0, 0.5)
+        ]
+        assert np.linalg.norm(np.subtract(*tips)) > 0.01
 
 
 def test_a_joint_before_the_base_stands_at_0_only_where_that_is_in_its_range(tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from prior_reinforce.arm.robots.flange import (
 from prior_reinforce.arm.robots.limits import ENDLESS, PerJoint, RobotLimits
 from prior_reinforce.arm.robots.urdf_file import BESIDE, LARGEST, TURNING, TYPES, Joint, read_joints
 from prior_reinforce.errors import ConfigurationError, FileFormatError
-from prior_reinforce.plans.kinematics import UPRIGHT, Chain, Pose, rotation
+from prior_reinforce.plans.kinematics import UPRIGHT, Chain, Pose, leaning, rotation
 from prior_reinforce.wording import listed
 
 _MOST_NAMED = 40
@@ -81,13 +82,14 @@ def read_urdf(
         velocity, acceleration, jerk = (_largest(key, turning) for key in LARGEST)
         assert velocity is not None  # it is needed
         lower, upper = np.array([joint.range() for joint in turning]).T
-        upright = _upright(way[: way.index(chain[0])], hold)
+        upright = _upright(way[: way.index(chain[0])], named, hold)
         kinematics = _chain(chain, hold, upright)
     except (ConfigurationError, FileFormatError) as error:
         error.args = (f"{path}: {error}",)
         raise
-    tilted = bool(upright[2, 2] < math.cos(UPRIGHT))
-    source = f"{path.name}, from {chain[0].parent}{f' (z as in {links[0]})' * tilted} to {tip}"
+    tilted, steep = bool(upright[2, 2] < math.cos(UPRIGHT)), _is_steep(upright)
+    axes = f" ({'x and z' if steep else 'z'} as in {links[0]})" * tilted
+    source = f"{path.name}, from {chain[0].parent}{axes} to {tip}"
     source += "".join(f", {name} held at {position:g}" for name, position in said.items())
     source += ", soft limits too" * any("safety_controller" in joint.parts for joint in turning)
     if tree is not None:
@@ -128,10 +130,11 @@ def bases_on_axis(
     first = next(joint for joint in joints if joint.name == arm.joint_names[0])
     found = list[str]()
     for joint in joints_to(first.parent, moving, base):
-        x, y, _, *turned = _first_origin(read_urdf(path, tip, joint.child, hold))
-        same = np.allclose(turned, _first_origin(arm)[3:], atol=_SAME_AXES)
-        if same and math.hypot(x, y) <= within:
-            found.append(joint.child)
+        with suppress(ConfigurationError):  # a joint that is not held would turn this one
+            x, y, _, *turned = _first_origin(read_urdf(path, tip, joint.child, hold))
+            same = np.allclose(turned, _first_origin(arm)[3:], atol=_SAME_AXES)
+            if same and math.hypot(x, y) <= within:
+                found.append(joint.child)
     return base or links[0], found
 
 
@@ -266,7 +269,9 @@ def _largest(key: str, turning: Sequence[Joint]) -> PerJoint | None:
     return np.array([*said.values()])
 
 
-def _upright(before: Sequence[Joint], hold: Mapping[str, float]) -> np.ndarray:
+def _upright(
+    before: Sequence[Joint], named: Mapping[str, Joint], hold: Mapping[str, float]
+) -> np.ndarray:
     """Attitude of a base link in the frame that has its heading and the root's z, 3 x 3.
 
     So what is vertical, and where a box is high, stays what the file says of a mount on a ceiling
@@ -274,26 +279,36 @@ def _upright(before: Sequence[Joint], hold: Mapping[str, float]) -> np.ndarray:
 
     Args:
         before: Joints from the root to the link; those that move are at 0.
+        named: All joints.
         hold: Joints that stand still, and where.
 
     Raises:
-        ConfigurationError: One that turns cannot be at 0, and is not held.
+        ConfigurationError: One that is not held would turn the link in that frame.
     """
-    link = np.eye(3)
+    link, leans = np.eye(3), dict[str, float]()
     for joint in before:
-        stands = joint.nearest(0.0)
-        if joint.free and joint.name not in hold and stands:
-            low, high = joint.places()
-            raise joint.error(
-                f"stands before the base, and its range, {low:.4g} to {high:.4g} rad, is without "
-                f"0; say where in that it stands: --hold {joint.name}={stands:.4g}"
-            )
+        if joint.type in TURNING and joint.name not in hold:
+            leans[joint.name] = leaning(link @ joint.pose(None)[:3, :3] @ joint.axis())
         link = link @ joint.pose(hold.get(joint.name))[:3, :3]
+    steep = _is_steep(link)
+    for name, lean in leans.items():
+        # About a vertical axis, the link's heading turns with the link.
+        if steep or lean > _SAME_AXES:
+            leader = _led(named[name], named)[0]
+            low, high = leader.places()
+            raise leader.error(
+                f"stands before the base, and turns it by its range, {low:.4g} to {high:.4g} rad; "
+                f"say where in that it stands: --hold {leader.name}={leader.nearest(0.0):.4g}"
+            )
     if math.hypot(link[0, 2], link[1, 2]) < _ROUNDING and link[2, 2] > 0:
         return np.eye(3)
-    flat = math.hypot(link[0, 0], link[1, 0])
-    yaw = math.atan2(link[1, 0], link[0, 0]) if flat > _FLAT else 0.0
+    yaw = 0.0 if steep else math.atan2(link[1, 0], link[0, 0])
     return np.asarray(rotation(0.0, 0.0, -yaw) @ link)
+
+
+def _is_steep(attitude: np.ndarray) -> bool:
+    """Whether the x of a frame in one whose z is vertical is no heading."""
+    return math.hypot(attitude[0, 0], attitude[1, 0]) <= _FLAT
 
 
 def _chain(joints: Sequence[Joint], hold: Mapping[str, float], upright: np.ndarray) -> Chain:
