@@ -288,6 +288,8 @@ def test_soft_limits_narrow_a_joints_range(tmp_path, soft, says):
     arm = read_urdf(path)
     assert (arm.lower[0], arm.upper[0]) == (-1, 2.25)
     assert arm.source.endswith("soft limits too")
+    path.write_text(path.read_text().replace(ends, ""))
+    assert "soft limits" not in read_urdf(path).source
 
 
 def named_arm(tmp_path, names, mesh, behind=""):
@@ -551,6 +553,14 @@ def test_what_follows_behind_the_flange_may_be_wrong(tmp_path, multiplier):
     assert read_urdf(path, hold={"finger_joint": 0.4}).joint_names == ("a", "b", "c")
     with pytest.raises(ConfigurationError, match="joint mim "):
         read_urdf(path, "other", hold={"finger_joint": 0.4})
+
+
+def test_an_arms_joint_that_follows_no_joint_is_corrected_in_the_file(tmp_path):
+    path = tmp_path / "arm.urdf"
+    lost = J("c", "c_link", more='<mimic joint="zz"/>')
+    path.write_text(Urdf("a", [*arm(["a", "b"]), lost, J("d", "d_link")]).text())
+    with pytest.raises(ConfigurationError, match=r"joint c .*correct .*<mimic> of c"):
+        read_urdf(path, "d_link")
 
 
 @pytest.mark.parametrize("hold", [None, {"s": 0.0}])

@@ -91,7 +91,8 @@ def read_urdf(
     axes = f" ({'x and z' if steep else 'z'} as in {links[0]})" * tilted
     source = f"{path.name}, from {chain[0].parent}{axes} to {tip}"
     source += "".join(f", {name} held at {position:g}" for name, position in said.items())
-    source += ", soft limits too" * any("safety_controller" in joint.parts for joint in turning)
+    stops = [key for joint in turning for key in joint.parts.get("safety_controller", ())]
+    source += ", soft limits too" * any(key.startswith("soft_") for key in stops)
     if tree is not None:
         source += tree.said_behind(turning[-1].child)
     capped = [j for j in turning if j.type == "continuous" and 0 < np.ptp(j.ends()) < 2 * ENDLESS]
@@ -217,7 +218,7 @@ def _refuse_other(
         raise FileFormatError(f"no joint turns between the base and {tip}; say --tip")
     other = [j for j in chain if j.type in TYPES[3:] and j.name not in hold]
     for joint in [*turning, *other]:
-        if joint.mimics is not None and (joint in turning or _led(joint, named)[0] in turning):
+        if joint.mimics is not None and {joint, _led(joint, named)[0]} & {*turning}:
             raise joint.error(
                 f"follows another (<mimic> of {joint.mimics}), and so is no joint of its own; say "
                 "a --tip before it, or, where the arm goes on behind it, --robot none: no limits "
