@@ -262,6 +262,16 @@ def test_an_axis_of_another_length_has_its_direction_where_it_is_along_one(tmp_p
     assert read_urdf(path, "tool0").chain.axes[0] == (0.0, 0.0, 1.0)
 
 
+@pytest.mark.parametrize(("speeds", "asked"), [((22, 37), True), ((6, 27), False)])
+def test_speeds_that_few_arms_have_are_read_and_asked_about(tmp_path, speeds, asked):
+    joints = [J(name, name, speed=speed) for name, speed in zip("ab", speeds, strict=True)]
+    path = tmp_path / "arm.urdf"
+    path.write_text(Urdf("g1", joints).text())
+    found = read_urdf(path)
+    assert found.velocity.tolist() == [*speeds]
+    assert ("deg/s?" in found.source) == asked
+
+
 def test_links_that_no_arm_has_are_in_another_unit(tmp_path):
     path = write_urdf(tmp_path / "a.urdf", ur5e())
     path.write_text(path.read_text().replace("-0.425", "-4.25"))

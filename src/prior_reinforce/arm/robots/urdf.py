@@ -30,6 +30,9 @@ _SAME_AXES = 0.01
 _FLAT = 0.5
 """Least level part of a link's x that is a heading, [1]. Ours: within 60 degrees of level; of a
 mount that is calibrated to a degree it then turns by 2 degrees at most."""
+_BRISK = 12.0
+"""What some joint of an arm stays below, [rad/s]. Ours: the quickest of small servos do 11, and a
+fast wrist hangs on slower shoulders; of Unitree's G1, every joint of an arm does 22 to 37."""
 _LONGEST_LINK = 3.0
 """Between two joints of an arm, in [m]. Ours: the largest on the market have 1.7."""
 
@@ -95,6 +98,8 @@ def read_urdf(
     source += ", soft limits too" * any(key.startswith("soft_") for key in stops)
     if tree is not None:
         source += tree.said_behind(turning[-1].child)
+    if velocity.min() > _BRISK:
+        source += f"; velocities of {velocity.min():g} rad/s and more, are they in deg/s?"
     capped = [j for j in turning if j.type == "continuous" and 0 < np.ptp(j.ends()) < 2 * ENDLESS]
     over = [f"lower and upper of joint {joint.name}, which is continuous" for joint in capped]
     over += [f"{what} of joint {joint.name}" for joint in joints for what in joint.unknown]
