@@ -210,18 +210,14 @@ def test_a_urdf_that_lacks_a_character_is_refused_or_is_the_same_arm(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        (
-            '<axis xyz="0 0 1"/>',
-            "",
-            'joint a needs an axis of length 1, .*means <axis xyz="1 0 0"/>',
-        ),
+        ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 0"/>', "joint a has an <axis> of length 0"),
+        ('<axis xyz="0 0 1"/>', "<axis/>", "joint a has an <axis> of length 0"),
         ('<axis xyz="0 0 1"/>', '<axis xyz="0 1"/>', "joint a has <axis xyz=.*give 3 finite"),
         (
             '<axis xyz="0 0 1"/>',
             '<axis xyz="0 0 nan"/>',
             "joint a has <axis.*3 finite",
         ),
-        ('<axis xyz="0 0 1"/>', '<axis xyz="0 9 1"/>', "joint a needs an axis of length 1"),
         ('<origin xyz="0 0 0.333" rpy="0 0 0"/>', "", "joint a has no <origin>"),
         ("0 0 0.333", "0 0 1e999", "give 3 finite numbers"),
         ("0 0 0.333", "0 0 ${height}", "give 3 finite numbers"),
@@ -255,11 +251,46 @@ def test_what_is_wrong_in_a_urdf_is_named(tmp_path, old, new, says):
         read_urdf(path, "tool0")
 
 
-def test_an_axis_of_another_length_has_its_direction_where_it_is_along_one(tmp_path):
+@pytest.mark.parametrize(
+    ("xyz", "axis"), [("0 0 2", (0.0, 0.0, 1.0)), ("0 3 -4", (0.0, 0.6, -0.8))]
+)
+def test_an_axis_of_another_length_has_its_direction(tmp_path, xyz, axis):
+    path = write_urdf(tmp_path / "a.urdf", SMALL)
+    path.write_text(path.read_text().replace('axis xyz="0 0 1"', f'axis xyz="{xyz}"'))
+    found = read_urdf(path, "tool0")
+    np.testing.assert_allclose(found.chain.axes[0], axis)
+    np.testing.assert_allclose(
+        tool_tip(found.chain, np.array([0.4, -0.3]), TIP),
+        with_mujoco(path, "tool0", [0.4, -0.3]),
+        atol=1e-9,
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "axis", "ends", "said"),
+    [
+        ('<axis xyz="0 0 1"/>', "", (1.0, 0.0, 0.0), (-1.5, 2.25), "<axis> 1 0 0 of joint a"),
+        ('lower="-1.5" ', "", (0.0, 0.0, 1.0), (0.0, 2.25), "lower 0 of joint a"),
+        ('upper="2.25" ', "", (0.0, 0.0, 1.0), (-1.5, 0.0), "upper 0 of joint a"),
+    ],
+)
+def test_defaults_of_urdf_are_taken_and_named(tmp_path, old, new, axis, ends, said):
     path = write_urdf(tmp_path / "a.urdf", SMALL)
     text = path.read_text()
-    path.write_text(text.replace('xyz="0 0 1"', 'xyz="0 0 2"'))
-    assert read_urdf(path, "tool0").chain.axes[0] == (0.0, 0.0, 1.0)
+    at = text.index(old, text.index('name="a"'))
+    path.write_text(text[:at] + new + text[at + len(old) :])
+    found = read_urdf(path, "tool0")
+    assert found.chain.axes[0] == axis
+    assert (found.lower[0], found.upper[0]) == ends
+    assert found.source.endswith(said)
+
+
+def test_of_a_range_that_no_file_states_no_number_is_said(tmp_path):
+    path = write_urdf(tmp_path / "a.urdf", SMALL)
+    path.write_text(path.read_text().replace('lower="-1.5" upper="2.25" ', ""))
+    with pytest.raises(ConfigurationError, match="joint a has no range") as refused:
+        read_urdf(path, "tool0")
+    assert "inf" not in str(refused.value)
 
 
 @pytest.mark.parametrize(("speeds", "asked"), [((22, 37), True), ((6, 27), False)])

@@ -100,6 +100,8 @@ def read_urdf(
         source += tree.said_behind(turning[-1].child)
     if velocity.min() > _BRISK:
         source += f"; velocities of {velocity.min():g} rad/s and more, are they in deg/s?"
+    unsaid = [what for joint in chain if joint.has_axis for what in joint.unsaid()]
+    source += f"; as parsers of URDF take it: {listed(unsaid, most=3)}" * bool(unsaid)
     capped = [j for j in turning if j.type == "continuous" and 0 < np.ptp(j.ends()) < 2 * ENDLESS]
     over = [f"lower and upper of joint {joint.name}, which is continuous" for joint in capped]
     over += [f"{what} of joint {joint.name}" for joint in joints for what in joint.unknown]

@@ -1,10 +1,11 @@
 """Joints and links of a URDF, read strictly where they are of the arm.
 
-Ours rather than a library's: yourdfpy, urdfdom and MuJoCo pass over what they do not understand and
-take defaults for what is missing; with one character gone, an arm has another axis or fewer joints.
-Here, XML that is not well formed is an error, and so is a joint of the arm that lacks something or
-has a word that is nearly one of URDF's (wiki.ros.org/urdf/XML), or an unknown one in what places
-it. What else is unknown, and whatever stands in other joints, is passed over, and named.
+Ours rather than a library's: yourdfpy, urdfdom and MuJoCo pass over what they do not understand;
+with one character gone, an arm has another axis or fewer joints. Here, XML that is not well formed
+is an error, and so is a joint of the arm that lacks what has no default, or has a word that is
+nearly one of URDF's (wiki.ros.org/urdf/XML), or an unknown one in what places it. Defaults that
+count are named; what else is unknown, and whatever stands in other joints, is passed over, and
+named.
 """
 
 from __future__ import annotations
@@ -51,8 +52,8 @@ _ELSEWHERE = ("dynamics", "calibration")
 _NEARLY = 0.74
 """Share of two words' letters that agree from which one is a slip of the other (ours): `axs`."""
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
-_LENGTH_OF_AXIS = 0.01
-"""By how much an axis may differ from length 1: two written digits."""
+_OFF_LENGTH = 0.01
+"""By how much a quaternion may differ from length 1: two written digits."""
 _LONGEST_NAME, _LONGEST_PROBLEM, _LONGEST_WORD = 200, 400, 40
 _LARGEST_FILE = 20_000_000
 """Bytes (ours): several times what the largest humanoids have."""
@@ -119,6 +120,11 @@ class Joint:
     def free(self) -> bool:
         """Whether it turns by itself."""
         return self.type in TURNING and self.mimics is None
+
+    @property
+    def has_axis(self) -> bool:
+        """Whether it turns about an axis, or slides along one."""
+        return self.type in (*TURNING, "prismatic")
 
     def error(self, problem: str) -> ConfigurationError:
         """Return what to raise where something is wrong with it."""
@@ -196,7 +202,7 @@ class Joint:
 
     def check_held(self, position: float) -> None:
         """Refuse a place that was said, [rad] or [m], at which it cannot stand still."""
-        if self.type not in (*TURNING, "prismatic"):
+        if not self.has_axis:
             if position:
                 raise self.error(f"is {self.type}, and can be held at 0 alone")
             return
@@ -218,7 +224,7 @@ class Joint:
 
     def places(self) -> tuple[float, float]:
         """Lowest and highest place at which it can stand still, [rad] or [m]."""
-        if self.type not in (*TURNING, "prismatic"):
+        if not self.has_axis:
             return 0.0, 0.0
         turn = 2 * math.pi
         return (-turn, turn) if self.type == "continuous" else self.ends()
@@ -257,7 +263,7 @@ class Joint:
         if "rpy" in self.parts["origin"]:
             raise self.error("has rpy and quat_xyzw in its <origin>; take one out")
         quaternion = self.vector("origin", "quat_xyzw", 4)
-        if abs(math.hypot(*quaternion) - 1) > _LENGTH_OF_AXIS:
+        if abs(math.hypot(*quaternion) - 1) > _OFF_LENGTH:
             raise self.error(
                 f"needs a quat_xyzw of length 1, and it has {math.hypot(*quaternion):.3g}; write "
                 "x y z w of the turn"
@@ -267,34 +273,35 @@ class Joint:
         return np.asarray(Rotation.from_quat(quaternion).as_matrix())
 
     def axis(self) -> tuple[float, float, float]:
-        """About which it turns."""
-        x, y, z = self.vector("axis", "xyz")
-        length = math.hypot(x, y, z)
-        # A slip in the length of an axis along x, y or z leaves its direction.
-        along = sum(each != 0 for each in (x, y, z)) == 1
-        if abs(length - 1) > _LENGTH_OF_AXIS and not along:
-            has = (
-                f"its <axis> has {length:.3g}"
-                if "axis" in self.parts
-                else ('without an <axis> a URDF means <axis xyz="1 0 0"/>')
-            )
-            raise self.error(f"needs an axis of length 1, and {has}; write the one it turns about")
+        """About which it turns, or along which it slides: a direction, made of length 1."""
+        x, y, z = self.vector("axis", "xyz") if "axis" in self.parts else (1.0, 0.0, 0.0)
+        if not (length := math.hypot(x, y, z)):
+            raise self.error("has an <axis> of length 0; write the one it turns about")
         return x / length, y / length, z / length
 
     def ends(self) -> tuple[float, float]:
-        """Lower and upper end by its <limit>, infinite where it says none."""
+        """Lower and upper end by its <limit>: infinite where it says neither, else 0 for one."""
         low, high = self.number("limit", "lower"), self.number("limit", "upper")
-        return -math.inf if low is None else low, math.inf if high is None else high
+        return (-math.inf, math.inf) if low is None is high else (low or 0.0, high or 0.0)
+
+    def unsaid(self) -> list[str]:
+        """What its file leaves to the parsers of URDF, which all take it so."""
+        lacks = [] if "axis" in self.parts else ["<axis> 1 0 0"]
+        given = {"lower", "upper"} & self.parts.get("limit", {}).keys()
+        if self.type != "continuous" and len(given) == 1:
+            lacks += [f"{end} 0" for end in ("lower", "upper") if end not in given]
+        return [f"{what} of joint {self.name}" for what in lacks]
 
     def range(self) -> tuple[float, float]:
         """Lowest and highest position of a joint that turns, by its soft limits too."""
         low, high = (-ENDLESS, ENDLESS) if self.type == "continuous" else self.ends()
         if not -ENDLESS <= low < high <= ENDLESS:
-            why = ", in degrees?" * (ENDLESS < max(abs(low), abs(high)) < math.inf)
-            why += ", exchanged?" * (low > high)
+            has = f"{low:g} to {high:g}" if high < math.inf else "its <limit> has none"
+            has += ", in degrees?" * (ENDLESS < max(abs(low), abs(high)) < math.inf)
+            has += ", exchanged?" * (low > high)
             raise self.error(
-                f"has no range within {ENDLESS:.4g} rad: {low:g} to {high:g}{why}; write lower and "
-                "upper into its <limit>, in rad"
+                f"has no range within {ENDLESS:.4g} rad: {has}; write lower and upper into its "
+                "<limit>, in rad"
             )
         soft = [self.number("safety_controller", f"soft_{end}_limit") for end in ("lower", "upper")]
         lowest = low if soft[0] is None else max(low, soft[0])
