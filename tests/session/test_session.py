@@ -673,6 +673,22 @@ def test_a_class_is_no_object(which):
         Session(*given, GOAL, 0.015)
 
 
+@pytest.mark.parametrize(
+    ("which", "given", "remedy"),
+    [
+        (0, "auto", r"is no Generator; give one: pr\.make_generator\('auto'\)"),
+        (1, "bayes", r"is no Adapter; give one: pr\.make_adapter\('bayes'\)"),
+        (1, DEMOS, "is no Adapter; give one"),
+        (2, [[0.0]], "is no Demonstrations; give one"),
+    ],
+)
+def test_a_name_or_another_part_is_no_object_of_its_kind(which, given, remedy):
+    parts = [RepeatingGenerator().fit(DEMOS, seed=0), FullStepAdapter(), DEMOS]
+    parts[which] = given
+    with pytest.raises(ConfigurationError, match=remedy):
+        Session(*parts, GOAL, 0.015)
+
+
 def test_nothing_is_written_into_an_adapter(session):
     session.tell(session.ask().number, [0.05, 0.0])
     session.ask()

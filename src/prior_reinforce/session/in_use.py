@@ -14,6 +14,7 @@ from prior_reinforce.adapters.base import Adapter, Expectation, next_key
 from prior_reinforce.adapters.memory import AGAIN
 from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.errors import (
+    ConfigurationError,
     InvalidPlanError,
     OutOfReachError,
     RobotLimitError,
@@ -30,6 +31,22 @@ from prior_reinforce.wording import say_place
 
 _RIVAL = "rival"
 """Name of the model that is learned about the rival of the declared axis."""
+
+
+def check_parts(generator: object, adapter: object, demonstrations: object) -> None:
+    """Do nothing if each is an object of its kind, or a function that loads one.
+
+    ConfigurationError for a class, a name, or two that are exchanged.
+    """
+    kinds = ((generator, Generator), (adapter, Adapter), (demonstrations, Demonstrations))
+    for given, kind in kinds:
+        if isinstance(given, type):
+            raise ConfigurationError(
+                f"{given.__name__} is a class; give an object, for instance {given.__name__}()"
+            )
+        if not (isinstance(given, kind) or callable(given)):
+            made = f": pr.make_{kind.__name__.lower()}({given!r})" * isinstance(given, str)
+            raise ConfigurationError(f"{given!r:.60} is no {kind.__name__}; give one{made}")
 
 
 class InUse:

@@ -31,7 +31,7 @@ from prior_reinforce.parsing import as_place, as_reading
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.events import Amended, GoalSet, Told, Voided
-from prior_reinforce.session.in_use import InUse, generated, latest_goal
+from prior_reinforce.session.in_use import InUse, check_parts, generated, latest_goal
 from prior_reinforce.session.trials import Goal, Log, SessionState, Stage, Trial, Verdict
 
 
@@ -80,14 +80,10 @@ class Session:
         Raises:
             InvalidGoalError: The goal has a wrong shape, or is not finite.
             ConfigurationError: The tolerance is not positive, or does not say what counts in each
-                unit; or a class is given instead of an object.
+                unit; or a class or a name is given instead of an object.
             TrialStateError: A goal is given, and a trial for the one before waits to be told.
         """
-        for given in (generator, adapter, demonstrations):
-            if isinstance(given, type):
-                raise ConfigurationError(
-                    f"{given.__name__} is a class; give an object, for instance {given.__name__}()"
-                )
+        check_parts(generator, adapter, demonstrations)
         self.log = Log() if log is None else log
         self._given: Any = (generator, adapter, demonstrations)
         self._gate, self._check_open = gate, check_open

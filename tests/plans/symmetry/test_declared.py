@@ -58,6 +58,12 @@ def test_a_turn_about_the_base_turns_where_the_tip_is_whichever_way_the_joint_co
     np.testing.assert_allclose(after, before @ np.array([[cos, sin], [-sin, cos]]), atol=1e-6)
 
 
+def test_a_distance_that_does_not_exist_is_named():
+    form = PlanFormat(("x", "y"), ("m", "m"), 0.02)
+    with pytest.raises(ConfigurationError, match=r"one of tempo, .*shift, got 'faster'"):
+        declare_symmetry(form, 2, about="base", distance="faster")
+
+
 def test_an_object_at_a_place_is_turned_about_by_kinematics():
     symmetry = declare_symmetry(JOINTS, 2, about=(0.43, 0.0), **ARM)
     assert kinds(symmetry) == [Tempo, TurnPath]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -38,7 +39,7 @@ _LONGEST_LINK = 3.0
 
 
 def read_urdf(
-    path: Path,
+    path: str | os.PathLike[str],
     tip: str | None = None,
     base: str | None = None,
     hold: Mapping[str, float] | None = None,
@@ -63,6 +64,7 @@ def read_urdf(
         ConfigurationError: No such link, or a joint without limits.
         UnclearFlangeError: A joint may be the arm's or a tool's, or there are several arms.
     """
+    path = Path(path)
     name, joints, links, meshes = read_joints(path)
     moving, said = {joint.child: joint for joint in joints}, dict(hold or {})
     named = {joint.name: joint for joint in joints}

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from contextlib import suppress
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from msgspec import UNSET
@@ -94,6 +94,10 @@ def declare_symmetry(
             raise ConfigurationError(
                 f"{key} names {unknown}, but plans have {', '.join(form.names)}"
             )
+    if distance not in get_args(Distance):
+        raise ConfigurationError(
+            f"distance is one of {', '.join(get_args(Distance))}, got {distance!r}"
+        )
     if release_frame is not None and distance != "tempo":
         raise ConfigurationError(
             f"release_frame says about which frame tempo plays a motion; distance is {distance!r}"
