@@ -29,6 +29,7 @@ from .arm.robots.plan_files import resample_plan as resample_plan
 from .arm.robots.plan_files import write_plan as write_plan
 from .arm.robots.presets import robot_limits as robot_limits
 from .arm.robots.report import LimitReport as LimitReport
+from .arm.robots.urdf import read_urdf as read_urdf
 from .arm.workspace.template import NewWorkspace as NewWorkspace
 from .arm.workspace.view import AdviceView as AdviceView
 from .arm.workspace.view import AskView as AskView

@@ -53,7 +53,7 @@ def read_urdf(
         tip: The link that is the flange; None takes `tool0`, `flange` or `link_eef` behind any
             prefix, else the link that the last turning joint moves, where one arm alone ends so.
         base: The link at which the base frame stands, for instance above a lift; None takes the
-            root. Its z is the root's, and its x the link's, laid flat; see `_upright`.
+            root. Its z is the root's, and its x the link's, laid flat.
         hold: Joints that stand still, and where, in [rad] and [m]; what follows one stands too.
 
     Returns:
