@@ -22,3 +22,21 @@ def test_rows_that_do_not_come_out_again_are_counted(tmp_path, monkeypatch, caps
         write_rows(tmp_path, "sets", rows, "this")
         assert main(arguments) == changed
         assert f"{0 if changed else 4} of 4 rows agree (seed 0)" in capsys.readouterr().out
+
+
+def test_rows_of_plans_alone_are_compared_by_what_they_say(tmp_path, monkeypatch, capsys):
+    planned = [
+        p
+        for p in RECIPES["ways"].units(replace(QUICK, goals=4))
+        if str(p[0]).startswith("plans of nearest")
+    ][:1]
+    recipe = replace(RECIPES["ways"], units=lambda scale, include: planned)
+    monkeypatch.setattr("reproduction.verify.RECIPES", {"ways": recipe})
+    rows = [dict(row) for row in Run(tmp_path).rows(planned)]
+    assert {"unlike"} <= rows[0].keys()
+    for changed in (0, 1):
+        for row in rows:
+            row["unlike"] = bool(row["unlike"]) ^ bool(changed)
+        write_rows(tmp_path, "ways", rows, "this")
+        assert main(["verify", "--sample", "4", "--results", str(tmp_path)]) == changed
+        assert f"{0 if changed else 4} of 4 rows agree (seed 0)" in capsys.readouterr().out

@@ -17,6 +17,7 @@ from reproduction.results import read_results, write_rows
 
 _GAVE = {"solved_at", "first_error", "lost", "failed_readings", "p_hit", "unlike", "commit"}
 """Columns that say what came of a row; the others say which row it is."""
+_COMPARED = ["solved_at", "first_error", "unlike"]
 _ROWS_A_UNIT = 5
 """Rows compared of each unit that is drawn: a unit runs whole."""
 _ROUNDED = 1e-5
@@ -86,12 +87,14 @@ def _again(folder: Path, recipe: str, unit: Planned) -> pd.DataFrame:
 
 
 def _side_by_side(again: pd.DataFrame, shipped: pd.DataFrame) -> pd.DataFrame:
-    """Rows of goals that both have."""
-    if "solved_at" not in again:
+    """Rows that both have; `displacement` and the like have none that is compared."""
+    if again.reindex(columns=_COMPARED).isna().all(axis=None):
         return again.iloc[:0]
     names = [name for name in again.dropna(axis="columns", how="all") if name not in _GAVE]
-    gave = ["solved_at", "first_error"]
-    a, b = (of[names].astype(object).map(_text).join(of[gave]) for of in (again, shipped))
+    a, b = (
+        of[names].astype(object).map(_text).join(of.reindex(columns=_COMPARED))
+        for of in (again, shipped)
+    )
     return a.merge(b, on=names, suffixes=("", "_shipped"))
 
 
@@ -103,5 +106,10 @@ def _text(cell: Any) -> str:
 
 
 def _equal(both: pd.DataFrame) -> pd.Series:
+    """Whether each row came out as shipped; what neither has is equal."""
     off = (both["first_error"] - both["first_error_shipped"]).abs()
-    return (both["solved_at"] == both["solved_at_shipped"]) & ~(off > 1.5 * _ROUNDED)
+    same = ~(off > 1.5 * _ROUNDED)
+    for of in ("solved_at", "unlike"):
+        one, two = both[of], both[f"{of}_shipped"]
+        same &= (one == two) | (one.isna() & two.isna())
+    return same
