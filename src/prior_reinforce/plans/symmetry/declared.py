@@ -20,6 +20,7 @@ from typing import Literal, get_args
 import numpy as np
 from msgspec import UNSET
 
+from prior_reinforce.arrays import is_positive
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.channels import is_coordinate, is_of_pose, is_tool_state
 from prior_reinforce.plans.kinematics import UPRIGHT, Chain, first_axis, leaning
@@ -98,6 +99,10 @@ def declare_symmetry(
         raise ConfigurationError(
             f"distance is one of {', '.join(get_args(Distance))}, got {distance!r}"
         )
+    if not is_positive(exponent):
+        raise ConfigurationError(f"exponent must be a positive number, got {exponent!r}")
+    if release_frame is not None and not release_frame >= 0:
+        raise ConfigurationError(f"release_frame counts frames from 0, got {release_frame!r}")
     if release_frame is not None and distance != "tempo":
         raise ConfigurationError(
             f"release_frame says about which frame tempo plays a motion; distance is {distance!r}"
