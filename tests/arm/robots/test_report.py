@@ -74,3 +74,8 @@ def test_every_refusal_is_named():
         RobotLimitError, match=r"velocity: joint4 at 2\.25 .*; jerk: joint1 at 9000"
     ):
         report(FAST, broken).require()
+    restless = LimitLine(check="rest at start", status="refuse", text="joint1 at 0.059 rad/s")
+    for lines, said in (((FAST,), False), ((FAST, restless), True)):
+        with pytest.raises(RobotLimitError, match="--smooth 20 or less") as refused:
+            report(*lines).require()
+        assert ("--no-trim" in str(refused.value)) is said

@@ -156,8 +156,11 @@ class LimitReport:
             RobotLimitError: The plan is refused; the message names check, joint, time and margin.
         """
         if self.refusals:
+            moves_on = "rest at " in self.refusals
             raise RobotLimitError(
                 f"plan refused for {self.robot}: {self.refusals}. Plans are never clipped or "
                 "slowed down: choose another goal or --generator, demonstrate gentler motions, or, "
-                "if the recordings are noisy, import them with --smooth 20 or less"
+                "if the recordings are noisy, import them with "
+                f"{'--no-trim, which keeps their still ends, or with ' * moves_on}"
+                "--smooth 20 or less"
             )
