@@ -308,3 +308,13 @@ def test_plugins_are_imported_before_a_command_is_read(run, tmp_path, monkeypatc
     )
     assert os.environ[PLUGINS] == "offset_plugin"  # for programs that are started from here
     assert "needs a module" in run("status", "--plugins")[2]
+
+
+def test_an_option_of_several_values_that_is_given_twice_is_refused(folder, tmp_path, capsys):
+    new = ["new", str(tmp_path / "w"), "--robot", "none", "--hold", "a=1", "--hold=b=2"]
+    assert main(new) == 2
+    assert "--hold is given twice; put all its values behind one" in capsys.readouterr().err
+    assert main(["import", folder, "none", "--leave_out", "a", "--leave-out", "b"]) == 2
+    assert "--leave-out is given twice" in capsys.readouterr().err
+    assert main(["import", folder, "none", "--key", "q", "--key", "gripper"]) == 2
+    assert "twice" not in capsys.readouterr().err

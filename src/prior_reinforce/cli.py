@@ -155,6 +155,7 @@ def read(kind: type[AnyCommand], program: str, args: list[str]) -> AnyCommand:
             config=(tyro.conf.DisallowNone, tyro.conf.FlagCreatePairsOff),
         )
     _check_values(command)
+    _refuse_twice(command, [arg.partition("=")[0].replace("_", "-") for arg in args])
     return command
 
 
@@ -249,6 +250,19 @@ def _tidied(shown: str) -> str:
     blanked = _EMPTY_DEFAULT.sub(lambda said: re.sub(r"[^\s\u2502]", "\0", said[0]), shown)
     lines = [line for line in blanked.splitlines(keepends=True) if not _ONLY_BLANKED.match(line)]
     return "".join(lines).replace("\0", " ")
+
+
+def _refuse_twice(given: object, said: Sequence[str]) -> None:
+    """Refuse an option of several values that was said twice: tyro keeps the last alone.
+
+    ConfigurationError if one was.
+    """
+    for each in fields(given) if is_dataclass(given) else ():
+        value, option = getattr(given, each.name), f"--{each.name.replace('_', '-')}"
+        _refuse_twice(value, said)
+        several = isinstance(value, tuple) and "UseAppendAction" not in str(each.type)
+        if several and said.count(option) > 1:
+            raise ConfigurationError(f"{option} is given twice; put all its values behind one")
 
 
 def _check_values(given: object, name: str = "") -> None:
