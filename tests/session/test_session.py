@@ -680,6 +680,11 @@ def test_a_class_is_no_object(which):
         (1, "bayes", r"is no Adapter; give one: pr\.make_adapter\('bayes'\)"),
         (1, DEMOS, "is no Adapter; give one"),
         (2, [[0.0]], "is no Demonstrations; give one"),
+        (
+            2,
+            "demos",
+            r"is no Demonstrations; give one: pr\.Demonstrations\(plans, outcomes, format",
+        ),
     ],
 )
 def test_a_name_or_another_part_is_no_object_of_its_kind(which, given, remedy):

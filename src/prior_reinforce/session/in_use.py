@@ -38,14 +38,18 @@ def check_parts(generator: object, adapter: object, demonstrations: object) -> N
 
     ConfigurationError for a class, a name, or two that are exchanged.
     """
-    kinds = ((generator, Generator), (adapter, Adapter), (demonstrations, Demonstrations))
-    for given, kind in kinds:
+    kinds = (
+        (generator, Generator, "pr.make_generator({!r})"),
+        (adapter, Adapter, "pr.make_adapter({!r})"),
+        (demonstrations, Demonstrations, "pr.Demonstrations(plans, outcomes, format)"),
+    )
+    for given, kind, call in kinds:
         if isinstance(given, type):
             raise ConfigurationError(
                 f"{given.__name__} is a class; give an object, for instance {given.__name__}()"
             )
         if not (isinstance(given, kind) or callable(given)):
-            made = f": pr.make_{kind.__name__.lower()}({given!r})" * isinstance(given, str)
+            made = f": {call.format(given)}" * isinstance(given, str)
             raise ConfigurationError(f"{given!r:.60} is no {kind.__name__}; give one{made}")
 
 
