@@ -389,7 +389,12 @@ def test_dates_and_spans_are_times_whose_unit_nobody_is_asked_for(tmp_path, star
         )
     np.save(tmp_path / "throw.npy", log)
     assert read_recordings(tmp_path / "throw.npy")[0].period == pytest.approx(0.02)
-    assert read_one(tmp_path, q=Q, dt=np.timedelta64(20, "ms")).period == pytest.approx(0.02)
+    for name in ("dt", "dt_ms"):
+        period = {name: np.timedelta64(20, "ms")}
+        assert read_one(tmp_path, q=Q, **period).period == pytest.approx(0.02)
+    for name in ("t_ns", "timestamp_ms", "t [0.1 ms]"):
+        named = read_one(tmp_path, **{"q": Q, name: stamps})
+        np.testing.assert_allclose(named.times, np.arange(101) / 50, atol=1e-6)
     stamps[5] = "NaT"
     with pytest.raises(InvalidDemonstrationsError, match=r"nan.* frame 5"):
         read_one(tmp_path, q=Q, timestamps=stamps)

@@ -29,8 +29,10 @@ from prior_reinforce.arm.recordings.recording import (
     unread,
 )
 from prior_reinforce.arm.recordings.stated import by_field, motion_keys, recorded_among
+from prior_reinforce.arm.recordings.units import SECONDS, split_unit
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import open_npz
+from prior_reinforce.units import base_of
 
 SUFFIXES = (".npz", ".npy")
 _MOTION_KEYS = ("q", "plans", "positions", "actions")
@@ -46,7 +48,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         if len(paths) > 1 and options.leaves_out(path.stem):
             yield path.stem, unread
         else:
-            arrays = {name: _seconds(own) for name, own in by_field(_arrays(path)).items()}
+            arrays = {name: _times(name, own) for name, own in by_field(_arrays(path)).items()}
             yield from _each(path, arrays, options)
 
 
@@ -135,8 +137,13 @@ def _arrays(path: Path) -> Arrays:
         return content
 
 
-def _seconds(array: np.ndarray) -> np.ndarray:
-    """Dates and times as numbers of [s], nan where one is missing; other arrays as they are."""
+def _times(name: str, array: np.ndarray) -> np.ndarray:
+    """Dates and times in the unit that their name says, else in [s], nan where one is missing.
+
+    Other arrays as they are.
+    """
     if array.dtype.kind == "M":
         array = array - np.datetime64(0, "s")
-    return array / np.timedelta64(1, "s") if array.dtype.kind == "m" else array
+    if array.dtype.kind != "m":
+        return array
+    return array / np.timedelta64(1, "s") / base_of(split_unit(name, SECONDS)[1] or "s")[1]
