@@ -501,6 +501,15 @@ def test_a_joint_before_the_base_stands_at_0_only_where_that_is_in_its_range(tmp
     assert read_urdf(path, "c_link", base="lifted", hold={"turntable": 1.0}).joint_names[0] == "a"
 
 
+@pytest.mark.parametrize("at", [0.0, 0.3])
+def test_a_joint_before_the_base_that_cannot_move_is_not_asked_for(tmp_path, at):
+    path, locked = tmp_path / "arm.urdf", J("waist", "base", axis=(0.0, 1.0, 0.0), low=at, high=at)
+    path.write_text(Urdf("locked", [locked, *arm(["a", "b"])]).text())
+    given = read_urdf(path, base="base", hold={"waist": at}).chain
+    tips = [tool_tip(chain, np.zeros(2)) for chain in (read_urdf(path, base="base").chain, given)]
+    np.testing.assert_allclose(*tips)
+
+
 @pytest.mark.parametrize(
     ("low", "high", "place"), [(0.1, 0.8, 0.1), (-0.8, -0.3, -0.3), (-1.0, 1.0, 0.0)]
 )

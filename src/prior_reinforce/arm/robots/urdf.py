@@ -297,9 +297,11 @@ def _upright(
     """
     link, leans = np.eye(3), dict[str, float]()
     for joint in before:
-        if joint.type in TURNING and joint.name not in hold:
+        low, high = joint.places()
+        stands = hold.get(joint.name, low if low == high else None)
+        if joint.type in TURNING and stands is None:
             leans[joint.name] = leaning(link @ joint.pose(None)[:3, :3] @ joint.axis())
-        link = link @ joint.pose(hold.get(joint.name))[:3, :3]
+        link = link @ joint.pose(stands)[:3, :3]
     steep = _is_steep(link)
     for name, lean in leans.items():
         # About a vertical axis, the link's heading turns with the link.
