@@ -90,6 +90,13 @@ def test_frames_of_nothing_but_0_amid_a_motion_were_not_read(rate, frames):
     assert len(through_0.recordings[0].times) == len(t)
 
 
+@pytest.mark.parametrize("each", [1, 20])
+def test_key_frames_and_commands_that_stand_may_pass_through_0(each):
+    q = np.repeat([[0.5, 1.0, 0.3], [0.0, 0.0, 0.0], [0.5, 1.2, 0.3]], each, axis=0)
+    told = Recording("7", 0.1 * np.arange(len(q)), q, ("a", "b", "c"))
+    np.testing.assert_array_equal(select([told]).recordings[0].positions, q)
+
+
 @pytest.mark.parametrize(
     ("names", "value"),
     [

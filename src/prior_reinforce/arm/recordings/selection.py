@@ -339,7 +339,8 @@ def _refuse_empty_frames(episode: str, positions: np.ndarray, joints: Sequence[s
         return
     steps = np.abs(np.diff(positions[:, moves], axis=0) / ranges[moves]).max(axis=1)
     leaps = empty[1:] != empty[:-1]
-    if steps[leaps].min() > _BEYOND * steps[~leaps].max():
+    usual = steps[~leaps].max(initial=0.0)  # 0 of key frames, and of commands that stand and leap
+    if 0 < _BEYOND * usual < steps[leaps].min():
         raise InvalidDemonstrationsError(
             f"episode {episode}: {say_names([joints[i] for i in moves])} are 0 in {empty.sum()} of "
             f"{len(empty)} frames, first in {empty.argmax()}, and leap there and back, {_NOT_READ}"
