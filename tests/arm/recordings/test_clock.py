@@ -194,6 +194,14 @@ def test_ticks_since_the_year_1_are_of_100_ns(rate):
     np.testing.assert_allclose(clock.times, np.arange(200) / 125, atol=2e-5)
 
 
+@pytest.mark.parametrize("rate", [{"rate": 50.0}, {"own_rate": 50.0, "rate_name": "fps"}])
+def test_a_counter_by_one_has_the_rate_of_its_frames_where_some_are_lost(rate):
+    frames = np.array([7, 8, 9, 12, 13])
+    clock = clock_of("a", 5, stamps=frames, name="frame", **rate)
+    np.testing.assert_allclose(clock.times, frames / 50)
+    assert clock.ambiguities == ()
+
+
 def test_other_ticks_are_asked_for_their_length():
     stamps = np.arange(200) * 80_000.0
     (doubt,) = clock_of("a", 200, stamps=stamps, name="Ticks").ambiguities

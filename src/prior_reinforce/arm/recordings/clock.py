@@ -190,8 +190,10 @@ def clock_of(
     known, of_one = without_number(known) if known else (None, 1.0)  # of `t [0.1 ms]`
     numbers = numbers * of_one
     counts = not known and time_unit is None and is_counter(name, numbers)
-    if counts and (rate or own_rate) and np.all(np.diff(numbers) == 1):
-        known = FRAME
+    if counts and (rate or own_rate):
+        steps = np.diff(numbers)
+        if np.all(steps >= 1) and 2 * np.sum(steps > 1) <= len(steps):  # by one, but for lost ones
+            known = FRAME
     if known is None and time_unit is None and are_ticks(numbers):
         numbers, known = (numbers - numbers[0]) * 100, "ns"
     unknown = None if known or time_unit else _IN_BRACKETS.search(name)
