@@ -64,11 +64,14 @@ def test_a_distance_that_does_not_exist_is_named():
         declare_symmetry(form, 2, about="base", distance="faster")
 
 
-@pytest.mark.parametrize("setting", [{"exponent": -3.0}, {"exponent": 0.0}, {"release_frame": -1}])
+@pytest.mark.parametrize(
+    "setting", [{"exponent": float("inf")}, {"exponent": 0.0}, {"release_frame": -1}]
+)
 def test_settings_of_a_tempo_that_cannot_be_are_named(setting):
     form = PlanFormat(("x", "y"), ("m", "m"), 0.02)
     with pytest.raises(ConfigurationError, match=f"{next(iter(setting))} .*, got"):
         declare_symmetry(form, 2, about="base", **setting)
+    assert declare_symmetry(form, 2, about="base", exponent=-1.0).moves[0].exponent == -1.0
 
 
 def test_an_object_at_a_place_is_turned_about_by_kinematics():

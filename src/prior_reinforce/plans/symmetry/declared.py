@@ -99,8 +99,8 @@ def declare_symmetry(
         raise ConfigurationError(
             f"distance is one of {', '.join(get_args(Distance))}, got {distance!r}"
         )
-    if not is_positive(exponent):
-        raise ConfigurationError(f"exponent must be a positive number, got {exponent!r}")
+    if not is_positive(abs(exponent)):  # negative where faster is less
+        raise ConfigurationError(f"exponent must be a finite number and not 0, got {exponent!r}")
     if release_frame is not None and not release_frame >= 0:
         raise ConfigurationError(f"release_frame counts frames from 0, got {release_frame!r}")
     if release_frame is not None and distance != "tempo":
