@@ -65,7 +65,7 @@ def test_a_distance_that_does_not_exist_is_named():
 
 
 @pytest.mark.parametrize(
-    "setting", [{"exponent": float("inf")}, {"exponent": 0.0}, {"release_frame": -1}]
+    "setting", [{"exponent": np.inf}, {"exponent": 0.0}, {"release_frame": -1}]
 )
 def test_settings_of_a_tempo_that_cannot_be_are_named(setting):
     form = PlanFormat(("x", "y"), ("m", "m"), 0.02)
