@@ -12,6 +12,7 @@ from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.symmetry import (
+    Amplitude,
     Delay,
     Learned,
     Symmetry,
@@ -176,6 +177,23 @@ def test_a_symmetry_that_does_not_hold_is_noticed_within_two_trials_and_no_other
     assert wrong.adapter.symmetry_odds["as stated"] < 0.5
     assert "turn and tempo" in wrong.adapter.expect(goal, goal, 0.015).remark
     assert not right.adapter.symmetry_doubted
+
+
+@pytest.mark.parametrize(("law", "said"), [(0.0, True), (0.5, False), (1.0, False), (2.0, False)])
+def test_a_tempo_that_has_no_effect_is_named_with_what_may_have_one(law, said):
+    arm, goal = Arm(gain=[[law, 0.0], [0.0, 1.0]]), np.array([1.3, 0.1])
+    remarks = []
+    for _ in range(6):
+        arm.throw(goal)
+        remarks.append(arm.adapter.expect(goal, goal, 0.015).remark)
+    assert any('distance = "amplitude"' in remark for remark in remarks) is said
+    arm = Arm(
+        [[0.0, 0.0], [0.0, 1.0]],
+        shown=demonstrations(symmetry=turn_and_scale(TurnJoint(), scale=Amplitude())),
+    )
+    for _ in range(6):
+        arm.throw(goal)
+        assert "amplitude" not in arm.adapter.expect(goal, goal, 0.015).remark.partition("(")[0]
 
 
 def test_where_nothing_is_wrong_nothing_is_said():

@@ -16,11 +16,14 @@ from prior_reinforce.adapters.moved_prior import AS_STATED, OTHER_WAY
 from prior_reinforce.adapters.p_hit import trials_to_go
 from prior_reinforce.arrays import Point, Points
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.symmetry import LogDistance, Polar
+from prior_reinforce.plans.symmetry import LogDistance, Polar, Tempo
 from prior_reinforce.readings import Reading
 
 _BACK = 0.5
 """What is left of the way from the demonstration where an object was lost (ours)."""
+_TELL_IN_VAIN, _FARTHER, _AS_FAR = 3, 0.2, 0.2
+"""How many trials tell at least that tempo has no effect, how much farther they were aimed, in
+logarithms of the distance, and within which part of that outcomes then lie (ours)."""
 
 
 class MovedTrials:
@@ -152,6 +155,11 @@ class MovedTrials:
     def remark(self, goal: Point) -> str:
         """What a person should know before the next trial for a goal, in one line, or nothing."""
         belief, model, symmetry = self.belief, self.belief.model(0), self.belief.symmetry
+        if farther := self._aimed_farther_in_vain(goal):
+            return (
+                f"plans aimed {farther:.0%} farther landed no farther: where speed has no effect, "
+                'distance goes by amplitude, distance = "amplitude"'
+            )
         if beyond := self._beyond(goal):
             return (
                 f"the goal is {beyond} than the demonstration can be moved ({symmetry.name}); "
@@ -174,6 +182,22 @@ class MovedTrials:
             )
             return f"{which} elsewhere: was something moved?"
         return ""
+
+    def _aimed_farther_in_vain(self, goal: Point) -> float:
+        """By what part plans of one tempo were aimed farther than others that landed as far; or 0.
+
+        Of trials for a goal that missed, with all as it is now.
+        """
+        trials, polar = self._told_as_now(goal), isinstance(self.chart, (Polar, LogDistance))
+        trials = trials.only(np.isfinite(trials.high - trials.low).all(axis=1))
+        if not polar or not isinstance(self.belief.symmetry.moves[0], Tempo):
+            return 0.0
+        if len(trials.numbers) < _TELL_IN_VAIN:
+            return 0.0
+        landed = self.chart.to(trials.goals + 0.5 * (trials.low + trials.high))[:, 0]
+        asked = float(np.ptp(trials.conditions[:, 0]))
+        in_vain = asked > _FARTHER and np.ptp(landed) < _AS_FAR * asked
+        return float(np.expm1(asked)) if in_vain else 0.0
 
     def _beyond(self, goal: Point) -> str:
         """Say whether a goal is farther or nearer than plans may be moved; nothing if neither."""
