@@ -150,7 +150,7 @@ def test_errors_of_ones_own_constructor_pass_through(add):
         ("rigged,battens=many", "rigged,battens=many: .*battens"),
         ("rigged,battens=0", "battens must be at least 1"),
         ("missing", "cannot import nowhere:Sail: .*PYTHONPATH"),
-        ("misspelt", "cannot import .*Sails.*check its spelling"),
+        ("misspelt", "cannot find .*Sails.*check its spelling"),
         ("other", "other must derive from .*Sail"),
     ],
 )

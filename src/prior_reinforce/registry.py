@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import operator
 import os
 import pkgutil
 import re
@@ -255,11 +256,17 @@ def _plain(taker: Callable[..., Any], settings: Mapping[str, Any], choice: str) 
 
 
 def _resolve(target: str) -> Any:
+    module, _, name = target.partition(":")
     try:
-        return pkgutil.resolve_name(target)
-    except (ImportError, ValueError, AttributeError) as error:
+        found = importlib.import_module(module)
+    except (ImportError, ValueError) as error:
         missing = missing_extra(error) if isinstance(error, ImportError) else None
-        raise missing or ConfigurationError(
-            f"cannot import {target}: {error}; check its spelling, and that its module is "
-            "importable from here (PYTHONPATH)"
+        if missing is not None:
+            raise missing from error
+        raise ConfigurationError(
+            f"cannot import {target}: {error}; it must be importable from here (PYTHONPATH)"
         ) from error
+    try:
+        return operator.attrgetter(name)(found)
+    except AttributeError as error:
+        raise ConfigurationError(f"cannot find {target}: {error}; check its spelling") from error
