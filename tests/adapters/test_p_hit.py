@@ -131,6 +131,7 @@ def test_each_component_is_a_mixture_of_its_own(k):
     np.testing.assert_allclose(said, [np.mean(distance < r) for r in (0.1, 0.2)], atol=0.005)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("k", "off"), [(3, 0.005), (4, 0.08)])
 def test_a_hundred_candidates_share_the_cells_of_one_and_the_best_stays_the_best(
     k, off, monkeypatch

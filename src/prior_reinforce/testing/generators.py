@@ -58,6 +58,7 @@ class GeneratorContract:
             "no conditions give no plans, of shape (0, ...)"
         )
 
+    @pytest.mark.filterwarnings("ignore:the outcomes lie almost on one line")
     def test_two_demonstrations_are_enough(self) -> None:
         demos = synthetic_demonstrations(2)
         plans = self.make().fit(demos, seed=0).generate(demos.outcomes_seen)
