@@ -186,10 +186,11 @@ class MovedTrials:
     def _aimed_farther_in_vain(self, goal: Point) -> float:
         """By what part plans of one tempo were aimed farther than others that landed as far; or 0.
 
-        Of trials for a goal that missed, with all as it is now.
+        Of trials for a goal, also where something seems to have changed in between.
         """
-        trials, polar = self._told_as_now(goal), isinstance(self.chart, (Polar, LogDistance))
-        trials = trials.only(np.isfinite(trials.high - trials.low).all(axis=1))
+        memory, polar = self.belief.memory, isinstance(self.chart, (Polar, LogDistance))
+        read = np.isfinite(memory.high - memory.low).all(axis=1)
+        trials = memory.only(read & np.all(memory.goals == goal, axis=1))
         if not polar or not isinstance(self.belief.symmetry.moves[0], Tempo):
             return 0.0
         if len(trials.numbers) < _TELL_IN_VAIN:
