@@ -179,6 +179,7 @@ def test_a_symmetry_that_does_not_hold_is_noticed_within_two_trials_and_no_other
     assert not right.adapter.symmetry_doubted
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("law", "said"), [(0.0, True), (0.5, False), (1.0, False), (2.0, False)])
 def test_a_tempo_that_has_no_effect_is_named_with_what_may_have_one(law, said):
     arm, goal = Arm(gain=[[law, 0.0], [0.0, 1.0]]), np.array([1.3, 0.1])
