@@ -22,8 +22,9 @@ from prior_reinforce.readings import Reading
 _BACK = 0.5
 """What is left of the way from the demonstration where an object was lost (ours)."""
 _TELL_IN_VAIN, _FARTHER, _AS_FAR = 3, 0.2, 0.2
-"""How many trials tell at least that tempo has no effect, how much farther they were aimed, in
-logarithms of the distance, and within which part of that outcomes then lie (ours)."""
+"""Trials for a goal that tell at least that tempo has no effect, by how much they were aimed apart
+at least, as a logarithm of the distance, and the part of that by which outcomes lie apart at most.
+Ours: on drawn laws speed^p of p = 0.5 to 2.5 they never said so (175 trials)."""
 
 
 class MovedTrials:
@@ -157,8 +158,8 @@ class MovedTrials:
         belief, model, symmetry = self.belief, self.belief.model(0), self.belief.symmetry
         if farther := self._aimed_farther_in_vain(goal):
             return (
-                f"plans aimed {farther:.0%} farther landed no farther: where speed has no effect, "
-                'distance goes by amplitude, distance = "amplitude"'
+                f"plans that were aimed {farther:.0%} farther landed hardly farther; if speed has "
+                'no effect here, declare distance = "amplitude"'
             )
         if beyond := self._beyond(goal):
             return (
@@ -184,9 +185,9 @@ class MovedTrials:
         return ""
 
     def _aimed_farther_in_vain(self, goal: Point) -> float:
-        """By what part plans of one tempo were aimed farther than others that landed as far; or 0.
+        """How much farther plans were aimed than others that landed about as far, as a share; or 0.
 
-        Of trials for a goal, also where something seems to have changed in between.
+        Of all trials for a goal: where tempo has no effect, the belief takes that for a change.
         """
         memory, polar = self.belief.memory, isinstance(self.chart, (Polar, LogDistance))
         read = np.isfinite(memory.high - memory.low).all(axis=1)
