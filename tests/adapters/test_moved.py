@@ -469,6 +469,15 @@ def test_a_goal_farther_than_motions_can_be_moved_is_named():
     assert "is nearer than" in adapter.expect(adapter.propose(near), near, TOLERANCE).remark
 
 
+@pytest.mark.parametrize(("goal", "word"), [(2.5, "farther"), (0.4, "nearer"), (1.2, None)])
+def test_a_goal_farther_than_what_is_learned_reaches_is_named(goal, word):
+    adapter = Arm(shown=demonstrations(FOUR, turn_and_scale(TurnJoint(), scale=Learned()))).adapter
+    goal = np.array([0.6 * goal, -0.8 * goal])
+    expected = adapter.expect(adapter.propose(goal), goal, TOLERANCE)
+    assert expected.beyond is (word is not None)
+    assert (f"is {word} than" in expected.remark) is (word is not None)
+
+
 def test_numbers_give_gaussian_regression_in_a_chart_that_is_the_outcomes_own():
     """All is linear: G and b regressed upon the trials, with the offsets' covariance."""
     given = demonstrations(symmetry=shift())

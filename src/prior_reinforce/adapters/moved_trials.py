@@ -162,10 +162,7 @@ class MovedTrials:
                 'no effect here, declare distance = "amplitude"'
             )
         if beyond := self._beyond(goal):
-            return (
-                f"the goal is {beyond} than the demonstration can be moved ({symmetry.name}); "
-                "demonstrate nearer to it"
-            )
+            return f"the goal is {beyond}; demonstrate nearer to it"
         several = len(belief.prior.anchors.z) > symmetry.k
         instead = "; or learn the demonstrations without it: generator auto,symmetry=none" * several
         if model.name == OTHER_WAY:
@@ -202,18 +199,27 @@ class MovedTrials:
         return float(np.expm1(asked)) if in_vain else 0.0
 
     def _beyond(self, goal: Point) -> str:
-        """Say whether a goal is farther or nearer than plans may be moved; nothing if neither."""
-        belief, symmetry = self.belief, self.belief.symmetry
+        """Say whether a goal is farther or nearer than plans can be made for, or nothing.
+
+        They may be moved only so far; and what is learned is extrapolated by half its range.
+        """
+        belief, symmetry, shown = self.belief, self.belief.symmetry, self.belief.prior.anchors.z
         aim = belief.aim(goal, self.now, self._farthest(self._losses(goal)))
         w = belief.prior.moved(aim[None])[0]
         mean = belief.outcomes(0, self._places(self.chart.back(aim)[None], goal[None])).mean[0]
-        ends = np.abs(w) >= (1.0 - 1e-6) * symmetry.farthest
+        moved_to_end = np.abs(w) >= (1.0 - 1e-6) * symmetry.farthest
+        most = (1.0 - 1e-6) * symmetry.farthest_from(shown)
+        ends = (aim <= shown.min(axis=0) - most) | (aim >= shown.max(axis=0) + most)
+        ends = np.where(symmetry.learned, ends, moved_to_end)
         tolerance = np.linalg.norm(self._noise) / OF_TOLERANCE
         if not np.any(ends) or np.linalg.norm(mean - goal) <= tolerance:
             return ""
         distance = isinstance(self.chart, (Polar, LogDistance))
         short = self.chart.to(goal)[0] > self.chart.to(mean)[0]
-        return "nearer" if distance and ends[0] and not short else "farther"
+        which = "nearer" if distance and ends[0] and not short else "farther"
+        if np.any(moved_to_end):
+            return f"{which} than the demonstration can be moved ({symmetry.name})"
+        return f"{which} than plans learned from these go (half their range beyond them)"
 
     @property
     def _noise(self) -> Point:
