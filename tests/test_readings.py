@@ -88,6 +88,12 @@ def test_nothing_changes_where_it_was_not_seen_whether_it_hit():
     assert reading.within(RADIUS) is reading
 
 
+def test_a_number_farther_off_than_its_noise_explains_is_a_miss_without_being_told():
+    far, near = ([1.5 * RADIUS[0], 0.0], 0.2 * RADIUS[0]), ([1.3 * RADIUS[0], 0.0], 0.2 * RADIUS[0])
+    np.testing.assert_array_equal(Reading.measured(*far).within(RADIUS).missed_by_at_least, RADIUS)
+    assert Reading.measured(*near).within(RADIUS).missed_by_at_least is None
+
+
 coordinates = st.floats(-0.3, 0.3)
 
 

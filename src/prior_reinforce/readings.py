@@ -46,6 +46,9 @@ _SAME = 1e-9
 _MEASURED = 0.5
 """A number with an sd below this share of the tolerance is more informative than a hit (ours)."""
 
+_NOISE_SDS = 2.0
+"""Standard deviations of a reading within which it leaves a hit possible (ours)."""
+
 
 class ReadingRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A `Reading` as plain data; an open end of an interval is None."""
@@ -209,16 +212,17 @@ class Reading:
     def within(self, radius: Point) -> Self:
         """Condition the intervals on hit or miss.
 
-        After a hit every component lies within the radius; if that contradicts the intervals, the
-        hit is believed. After a miss, a component must make up for what the others cannot: "2 cm
-        long" that missed by more than 1.5 cm, and at most 1 cm to the side, was at least 1.1 cm
+        A number that is farther off than its noise explains is a miss, whether or not that was
+        told. After a hit every component lies within the radius; if that contradicts the intervals,
+        the hit is believed. After a miss, a component must make up for what the others cannot: "2
+        cm long" that missed by more than 1.5 cm, and at most 1 cm to the side, was at least 1.1 cm
         long. Components stay independent: intervals describe a box, and the ellipsoid itself is
         kept in `missed_by_at_least`.
 
         Args:
             radius: Tolerance of each component, shape (k,), in the outcomes' units.
         """
-        if self.hit is None:
+        if self.hit is None and not self._is_sure_miss(radius):
             return self
         if self.hit:
             measured = (self.low == self.high) & (self.sd < _MEASURED * radius)
@@ -238,6 +242,11 @@ class Reading:
             high=np.where(sound, high, self.high),
             missed_by_at_least=np.asarray(radius),
         )
+
+    def _is_sure_miss(self, radius: Point) -> bool:
+        """Whether the intervals, with their noise, are all outside of the tolerance."""
+        beyond = np.maximum(np.maximum(self.low, -self.high) - _NOISE_SDS * self.sd, 0.0)
+        return float(np.linalg.norm(beyond / radius)) > 1.0
 
     def record(self) -> ReadingRecord:
         """Plain data for a log."""

@@ -469,6 +469,18 @@ def test_a_goal_farther_than_motions_can_be_moved_is_named():
     assert "is nearer than" in adapter.expect(adapter.propose(near), near, TOLERANCE).remark
 
 
+@pytest.mark.parametrize("shown", [SHOWN, FOUR])
+def test_what_was_measured_to_miss_is_not_tried_again_whatever_is_believed(shown):
+    """Everything lands at one place."""
+    adapter, tried = Arm(shown=demonstrations(shown)).adapter, np.empty((0, 2))
+    for _ in range(6):
+        condition = adapter.propose(GOALS[0])
+        reading = Reading.measured([0.3, -0.2], 0.002).within(TOLERANCE)
+        adapter.observe(condition, GOALS[0], reading)
+        assert np.all(np.linalg.norm((tried - condition) / TOLERANCE, axis=1) > 0.49)
+        tried = np.vstack([tried, condition])
+
+
 @pytest.mark.parametrize(("goal", "word"), [(2.5, "farther"), (0.4, "nearer"), (1.2, None)])
 def test_a_goal_farther_than_what_is_learned_reaches_is_named(goal, word):
     adapter = Arm(shown=demonstrations(FOUR, turn_and_scale(TurnJoint(), scale=Learned()))).adapter
