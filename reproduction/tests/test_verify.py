@@ -37,6 +37,7 @@ def test_rows_of_plans_alone_are_compared_by_what_they_say(tmp_path, monkeypatch
     for changed in (0, 1):
         for row in rows:
             row["unlike"] = bool(row["unlike"]) ^ bool(changed)
-        write_rows(tmp_path, "ways", rows, "this")
+        tried = [row | {"adapter": "bayes", "unlike": None, "solved_at": 1} for row in rows]
+        write_rows(tmp_path, "ways", rows + tried, "this")
         assert main(["verify", "--sample", "4", "--results", str(tmp_path)]) == changed
         assert f"{0 if changed else 4} of 4 rows agree (seed 0)" in capsys.readouterr().out

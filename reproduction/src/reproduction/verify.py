@@ -90,9 +90,9 @@ def _side_by_side(again: pd.DataFrame, shipped: pd.DataFrame) -> pd.DataFrame:
     """Rows that both have; `displacement` and the like have none that is compared."""
     if again.reindex(columns=_COMPARED).isna().all(axis=None):
         return again.iloc[:0]
-    names = [name for name in again.dropna(axis="columns", how="all") if name not in _GAVE]
+    names = [name for name in shipped if name not in _GAVE]
     a, b = (
-        of[names].astype(object).map(_text).join(of.reindex(columns=_COMPARED))
+        of.reindex(columns=names).astype(object).map(_text).join(of.reindex(columns=_COMPARED))
         for of in (again, shipped)
     )
     return a.merge(b, on=names, suffixes=("", "_shipped"))
