@@ -10,7 +10,6 @@ SOURCE, TESTS = REPOSITORY / "src" / "prior_reinforce", REPOSITORY / "tests"
 
 TESTED_ELSEWHERE = {
     "__main__": "one call, in test_cli",
-    "errors": "only names, which every test of bad input uses",
     "adapters/base": "what the base does for all is in testing/test_adapters",
     "adapters/displaced_trials": "half of the adapter of adapters/test_bayesian",
     "adapters/moved_prior": "the prior of the model in adapters/test_moved",

@@ -9,10 +9,17 @@ from typing import Any, Literal, get_args, get_origin
 
 
 class PriorReinforceError(Exception):
-    """Base of all errors that this package raises on purpose."""
+    """Base of all errors that this package raises on purpose: a problem, and perhaps its remedy.
+
+    The message joins both; who knows better what to do takes the `problem` alone.
+    """
 
     changed = False
     """Whether something was written before; what then failed was another step of the same call."""
+
+    def __init__(self, problem: str = "", *, remedy: str = "") -> None:
+        self.problem, self.remedy = problem, remedy
+        super().__init__(f"{problem}; {remedy}" if remedy else problem)
 
 
 class InvalidPlanError(PriorReinforceError, ValueError):
@@ -38,14 +45,14 @@ class ConfigurationError(PriorReinforceError, ValueError):
 class UnclearUnitsError(ConfigurationError):
     """Recorded units, times or names are not said, or cannot be what they would be taken for.
 
-    `what` says so in words, `options` are the command-line options that say they are what they
-    look like, and `also` is what else is wrong.
+    `options` are the command-line options that say they are what they look like, and `also` is
+    what else is wrong.
     """
 
-    def __init__(self, what: str, options: str, also: str = "") -> None:
-        self.what, self.options, self.also = what, options, also
+    def __init__(self, problem: str, options: str, also: str = "") -> None:
+        self.options, self.also = options, also
         more = f"; and {also}" if also else ""
-        super().__init__(f"{what}; if so, add: {options}{more}")
+        super().__init__(problem, remedy=f"if so, add: {options}{more}")
 
 
 class UnclearFlangeError(ConfigurationError):

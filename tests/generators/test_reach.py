@@ -8,6 +8,7 @@ import pytest
 from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.errors import OutOfReachError
 from prior_reinforce.generators import make_generator
+from prior_reinforce.generators.base import Generator
 from prior_reinforce.generators.reach import farthest_between, goals_around, reach, refusal
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.plan_format import PlanFormat
@@ -81,6 +82,19 @@ def test_what_kinematics_cannot_do_is_out_of_reach_by_name():
     why = refusal(generator, [0.9, 0.0], lambda *_: "")
     assert why.startswith("turned by")
     assert "demonstrate" not in why  # what to do is said once, with the nearest goal
+
+
+def test_all_of_why_a_goal_is_out_of_reach_is_said_and_no_remedy():
+    class NeverReaches(Generator):
+        def _fit(self, demonstrations, seed, progress):
+            pass
+
+        def _generate(self, conditions):
+            raise OutOfReachError("joint 1 stops; joint 2 too", remedy="go nearer")
+
+    generator = NeverReaches()
+    generator._outcome_dim = 2
+    assert refusal(generator, [1.0, 0.0], lambda *_: "") == "joint 1 stops; joint 2 too"
 
 
 def test_goals_are_tried_all_round_as_far_as_a_symmetry_is_believed():

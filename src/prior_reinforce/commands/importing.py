@@ -126,7 +126,7 @@ class Import(OnWorkspace):
         except UnclearUnitsError as error:
             also = f"{error.also}; and " if error.also else ""
             command = self._command(error.options)
-            raise ConfigurationError(f"{also}{error.what}; if so: {command}") from error
+            raise ConfigurationError(f"{also}{error.problem}; if so: {command}") from error
 
     def _import(
         self, workspace: Workspace, wanted: Wanted, recordings: Recordings, selection: Selection
@@ -225,6 +225,6 @@ def _settle(ambiguities: Unclear, *, at_terminal: bool) -> None:
         raise_if_ambiguous(ambiguities)
     except UnclearUnitsError as unclear:
         can_agree = all(one.guessed for one in ambiguities)
-        if at_terminal and can_agree and agrees(f"{plain(unclear.what)}; is it so?"):
+        if at_terminal and can_agree and agrees(f"{plain(unclear.problem)}; is it so?"):
             return
         raise

@@ -37,7 +37,7 @@ def refusal(generator: Generator, goal: ArrayLike, check: Check) -> str:
         place = np.asarray(goal, dtype=np.float64)
         (plan,) = generator.generate(place[None])
     except OutOfReachError as error:
-        return str(error).partition("; ")[0]  # who asked says what to do
+        return error.problem  # who asked says what to do
     return check(plan, place)
 
 

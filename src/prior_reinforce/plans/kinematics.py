@@ -195,8 +195,8 @@ def turned_path(
         raise OutOfReachError(
             f"turned by {angle:.3g} rad about ({centre[0]:g}, {centre[1]:g}) m, "
             f"frame {worst} is {np.abs(off[worst, :3]).max():.2g} m and "
-            f"{np.abs(off[worst, 3:]).max():.2g} rad away from where the arm comes; "
-            "demonstrate nearer to the goal"
+            f"{np.abs(off[worst, 3:]).max():.2g} rad away from where the arm comes",
+            remedy="demonstrate nearer to the goal",
         )
     return q
 

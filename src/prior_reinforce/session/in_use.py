@@ -202,8 +202,9 @@ class InUse:
                 said = f"{error}; trial {n} went as far as passes, and missed: {nearer}"
                 raise RobotLimitError(said) from error
             (plan,) = generator.generate(nearest[None])
-            why = str(error.__cause__).split(". ")[0]
-            limited = f"moved only as far as passes, which may not do ({why}); {nearer}"
+            own = error.__cause__  # the verdict's
+            assert isinstance(own, RobotLimitError)
+            limited = f"moved only as far as passes, which may not do ({own.problem}); {nearer}"
             verdict = verdict_on(plan, nearest, self._say_no_plan(state, nearest))
             return self._asked(state, nearest, verdict, limited), plan, verdict
         if verdict is not None and (n := _missed(state, wanted)):

@@ -399,7 +399,7 @@ class Session:
             if verdict is not None:
                 verdict.require()
         except RobotLimitError as error:
-            raise RobotLimitError(f"{refusal}: {error}") from error
+            raise RobotLimitError(f"{refusal}: {error.problem}", remedy=error.remedy) from error
         return verdict
 
 
