@@ -1,5 +1,7 @@
 """Readings that are kept, and films that are drawn or not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from prior_reinforce.environment import Rollout
 from prior_reinforce.errors import PerceptionFailedError, RenderingUnavailableError
 from prior_reinforce.generators import make_generator
 from prior_reinforce.perception.exact import Exact
+from prior_reinforce.session.trials import Stage, Trial
 from prior_reinforce.simulation.adaptation import goal_record, recording
 from prior_reinforce.simulation.protocol import GoalTrials, run_goals
 from prior_reinforce.simulation.tasks import make_task
@@ -87,9 +90,7 @@ def test_what_a_report_tells_says_why_there_is_no_film(tmp_path, monkeypatch):
 
 
 def test_the_number_of_trials_a_goal_took_does_not_depend_on_their_numbers():
-    class Told:
-        def __init__(self, number, hit):
-            self.number, self.hit = number, hit
-
-    assert GoalTrials(GOAL, (Told(7, False), Told(8, True)), ()).solved_at == 2
-    assert GoalTrials(GOAL, (Told(7, False),), ()).solved_at is None
+    missed = Trial(7, 1, GOAL, stage=Stage.TOLD)
+    hit = replace(missed, number=8, hit=True)
+    assert GoalTrials(GOAL, (missed, hit), ()).solved_at == 2
+    assert GoalTrials(GOAL, (missed,), ()).solved_at is None

@@ -21,7 +21,7 @@ from prior_reinforce.arrays import Point, as_goal
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.formats import OutcomeFormat, in_tolerances
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.session.trials import Stage, Trial
+from prior_reinforce.session.trials import Stage, Trial, told_of, trials_to_hit
 
 Box = Float[np.ndarray, "2 k"]
 """Lower and upper corner of a region of outcomes."""
@@ -115,13 +115,13 @@ class AdaptationRecord:
 
     @property
     def told(self) -> tuple[Trial, ...]:
-        """The trials that count; voided ones do not (paper, Evaluation Protocol)."""
-        return tuple(trial for trial in self.trials if trial.stage is Stage.TOLD)
+        """The trials that count, as in `told_of`."""
+        return told_of(self.trials)
 
     @property
     def trials_to_hit(self) -> int | None:
         """Stage-2 trials up to and with the first hit; None while the goal is not reached."""
-        return next((n for n, trial in enumerate(self.told, start=1) if trial.hit), None)
+        return trials_to_hit(self.trials)
 
     @property
     def distance_unit(self) -> str:

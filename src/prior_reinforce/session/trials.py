@@ -6,7 +6,7 @@ the events in a list; a workspace's keeps a journal on disk.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -163,6 +163,16 @@ class Trial:
     def amendable(self) -> bool:
         """Whether it was told, be it voided since, so that this can be corrected."""
         return self.stage is Stage.TOLD or self.told_before
+
+
+def told_of(trials: Iterable[Trial]) -> tuple[Trial, ...]:
+    """Return the trials that count; voided and open ones do not (paper, Evaluation Protocol)."""
+    return tuple(trial for trial in trials if trial.stage is Stage.TOLD)
+
+
+def trials_to_hit(trials: Iterable[Trial]) -> int | None:
+    """How many trials that count it took, up to and with the first hit; None where none hit."""
+    return next((n for n, trial in enumerate(told_of(trials), start=1) if trial.hit), None)
 
 
 class SessionState:

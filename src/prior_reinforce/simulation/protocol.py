@@ -26,7 +26,7 @@ from prior_reinforce.perception.eye import Eye
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.session import Session, ask_all
-from prior_reinforce.session.trials import Trial
+from prior_reinforce.session.trials import Trial, trials_to_hit
 
 FailedReading = Callable[[PerceptionFailedError, Rollout, Point, np.random.Generator], Reading]
 """Fallback where perception fails: why, rollout, goal, source of noise -> what is seen."""
@@ -53,7 +53,7 @@ class GoalTrials:
     @property
     def solved_at(self) -> int | None:
         """How many trials it took to reach the goal; None where none did."""
-        return next((i for i, trial in enumerate(self.trials, start=1) if trial.hit), None)
+        return trials_to_hit(self.trials)
 
     @property
     def errors(self) -> Points:

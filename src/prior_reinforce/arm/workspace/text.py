@@ -12,7 +12,7 @@ from prior_reinforce.arm.workspace.events import Moved, Moving
 from prior_reinforce.arm.workspace.manifest import Manifest, workspace_around
 from prior_reinforce.arm.workspace.state import Standing
 from prior_reinforce.errors import TrialStateError
-from prior_reinforce.session.trials import SessionState, Stage, Trial
+from prior_reinforce.session.trials import SessionState, Trial, told_of
 from prior_reinforce.terminal import plain
 from prior_reinforce.wording import error_example, say_chance, say_reading, say_trials
 
@@ -70,7 +70,7 @@ def say_expectation(now: Standing, trial: Trial) -> list[str]:
         lines[0] += f"; {say_trials(expected.trials)} trials to go"
     if expected.remark:
         lines.append(expected.remark)
-    told = [known for known in state.trials if known.stage is Stage.TOLD]
+    told = told_of(state.trials)
     shown, moved = state.demonstrations, now.manifest.symmetry
     if not told and shown is not None and shown.n == 1 and moved and expected.sd is not None:
         form = now.manifest.outcome_format

@@ -19,7 +19,7 @@ from prior_reinforce.arm.workspace.state import Standing, Step
 from prior_reinforce.arm.workspace.text import goal_step, next_step, say_trial, say_warning
 from prior_reinforce.files import as_cell
 from prior_reinforce.formats import OutcomeFormat
-from prior_reinforce.session.trials import Goal, SessionState, Stage, Trial
+from prior_reinforce.session.trials import Goal, SessionState, Trial, told_of, trials_to_hit
 from prior_reinforce.terminal import plain
 from prior_reinforce.wording import (
     as_html,
@@ -293,8 +293,7 @@ def status_view(now: Standing) -> StatusView:
 
 
 def _goal_view(state: SessionState, goal: Goal) -> GoalView:
-    told = [t for t in state.trials_of(goal.number) if t.stage is Stage.TOLD]
-    hits = [count for count, trial in enumerate(told, start=1) if trial.hit]
+    trials = state.trials_of(goal.number)
     return GoalView(
         number=goal.number,
         goal=goal.goal.tolist(),
@@ -302,8 +301,8 @@ def _goal_view(state: SessionState, goal: Goal) -> GoalView:
         adapter=goal.adapter,
         earlier_trials=goal.carry_over,
         new_hardware=goal.new_hardware,
-        told=len(told),
-        reached_after=hits[0] if hits else None,
+        told=len(told_of(trials)),
+        reached_after=trials_to_hit(trials),
     )
 
 
