@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from prior_reinforce.errors import InvalidPlanError
-from prior_reinforce.plans.interpolation import interpolate
+from prior_reinforce.plans.interpolation import interp_columns, interpolate
 from prior_reinforce.plans.interpolation import minimum_jerk as course
 
 
@@ -97,3 +97,11 @@ def test_a_minimum_jerk_course_is_held_beyond_its_ends():
     np.testing.assert_allclose(course(np.array([-1.0, 0.0, 0.5, 1.0, 2.0])), [0, 0, 0.5, 1, 1])
     slope = np.gradient(course(np.linspace(0, 1, 1001)), 1e-3)
     assert abs(slope.max() - 15 / 8) < 1e-4
+
+
+def test_columns_are_interpolated_each_and_held_beyond_their_ends():
+    columns = np.array([[0.0, 10.0], [1.0, 30.0], [3.0, 30.0]])
+    at = np.array([-1.0, 0.5, 1.5, 9.0])
+    found = interp_columns(at, np.array([0.0, 1.0, 2.0]), columns)
+    np.testing.assert_allclose(found, [[0.0, 10.0], [0.5, 20.0], [2.0, 30.0], [3.0, 30.0]])
+    assert interp_columns(at, np.arange(3.0), columns[:, :0]).shape == (4, 0)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Real
 from numpy.typing import ArrayLike
 
 from prior_reinforce.errors import InvalidPlanError
@@ -50,6 +50,21 @@ def minimum_jerk(part: Float[np.ndarray, "*s"]) -> Float[np.ndarray, "*s"]:
     """
     part = np.clip(part, 0.0, 1.0)
     return part**3 * (10.0 - 15.0 * part + 6.0 * part**2)
+
+
+def interp_columns(
+    at: Float[np.ndarray, " n"],
+    times: Real[np.ndarray, " T"],
+    columns: Float[np.ndarray, "T D"],
+) -> Float[np.ndarray, "n D"]:
+    """Return columns on straight lines between rising `times`, their ends held beyond.
+
+    `numpy.interp`, for each column; `at` and `times` are in the same unit, [s] or frames.
+    """
+    found = np.empty((len(at), columns.shape[1]))
+    for column, values in enumerate(columns.T):
+        found[:, column] = np.interp(at, times, values)
+    return found
 
 
 def join_frames(frames: ArrayLike, dt: float) -> CubicSpline:

@@ -34,7 +34,7 @@ from prior_reinforce.arm.executing.base import (
 from prior_reinforce.arm.executing.result import lag_behind
 from prior_reinforce.arm.robots.plan_files import resample_plan
 from prior_reinforce.errors import ConfigurationError, RobotLimitError
-from prior_reinforce.plans.interpolation import interpolate
+from prior_reinforce.plans.interpolation import interp_columns, interpolate
 from prior_reinforce.plans.motions import Plan
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.settings import Checked
@@ -198,8 +198,7 @@ class LeRobotArm(Executor):
         fine = interpolate(plan.actions, plan.format.dt, rate=config.rate, hold_after=settle)
         if config.goals == "ahead":
             return fine.q, fine.q + config.lag * fine.dq
-        later = np.array([np.interp(fine.t - config.lag, fine.t, column) for column in fine.q.T]).T
-        return later, fine.q
+        return interp_columns(fine.t - config.lag, fine.t, fine.q), fine.q
 
     def run(self, plan: Plan) -> MeasuredPath:
         """See `Executor`."""

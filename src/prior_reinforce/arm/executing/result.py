@@ -15,7 +15,7 @@ from jaxtyping import Float
 
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import open_npz
-from prior_reinforce.plans.interpolation import join_frames
+from prior_reinforce.plans.interpolation import interp_columns, join_frames
 from prior_reinforce.plans.motions import Plan
 from prior_reinforce.plans.plan_format import PlanFormat
 
@@ -147,7 +147,6 @@ def lag_behind(
     """
 
     def misfit(shift: float) -> float:
-        later = np.array([np.interp(t - shift, t, column) for column in goals.T]).T
-        return float(np.sum((measured - later) ** 2))
+        return float(np.sum((measured - interp_columns(t - shift, t, goals)) ** 2))
 
     return float(min(np.arange(301) * 1e-3, key=misfit))

@@ -27,7 +27,7 @@ from prior_reinforce.arm.robots.gate import check_plan
 from prior_reinforce.arm.robots.plan_files import resample_plan
 from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.errors import ConfigurationError, RobotLimitError
-from prior_reinforce.plans.interpolation import interpolate
+from prior_reinforce.plans.interpolation import interp_columns, interpolate
 from prior_reinforce.plans.motions import Plan
 from prior_reinforce.settings import Checked
 
@@ -158,8 +158,7 @@ class UR(Executor):
             control.disconnect()
         path = MeasuredPath.of(rows, 6, fault)
         if not fault and rows:
-            sent = np.array([np.interp(path.t, times, column) for column in goals.T]).T
-            behind = lag_behind(path.t, sent, path.q)
+            behind = lag_behind(path.t, interp_columns(path.t, times, goals), path.q)
             print(f"the arm followed its set points {behind * 1e3:.0f} ms behind", flush=True)
         return replace(path, moved=path.left(before, after))
 

@@ -18,6 +18,7 @@ from prior_reinforce.arm.recordings.recording import Beside, Positions, Recordin
 from prior_reinforce.arm.recordings.time_finder import Times, is_clock, says_time, tells_time
 from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, Ambiguity, say_names, split_unit
 from prior_reinforce.plans.channels import is_of_base, measured_of, says_no_position
+from prior_reinforce.plans.interpolation import interp_columns
 from prior_reinforce.plans.signals import held_channels
 from prior_reinforce.plans.whole_turns import TURN
 
@@ -104,7 +105,7 @@ def arrays_beside(
         if moving and len(values) != len(motion):
             at = np.linspace(times[0], times[-1], len(values))
             rate = f" ({len(values)} frames, beside {len(motion)})"
-            along = np.column_stack([np.interp(times, at, column) for column in numbers.T])
+            along = interp_columns(times, at, numbers)
             moving = moving if _is_series(name, numbers[:, moving], others) else []
         clocks = all(is_clock(name, numbers[:, i], at) for i in moving)
         if clocks or (not _of_another(name, called) and _follows(along, motion)):

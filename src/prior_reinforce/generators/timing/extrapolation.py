@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from prior_reinforce.arrays import Plans
+from prior_reinforce.plans.interpolation import interp_columns
 from prior_reinforce.plans.speeds import END_SPEED
 
 _SLOPE_FRAMES = 3
@@ -44,8 +45,8 @@ class ExtrapolatedPlans:
         outside = np.minimum(t, 0.0)[:, None] * before + np.maximum(t - last, 0.0)[:, None] * after
         inside = np.clip(t, 0.0, last)
         values = self._splines[i](inside)
-        for d in self._jumps:
-            values[:, d] = np.interp(inside, np.arange(last + 1), self._plans[i, :, d])
+        jumps = self._jumps
+        values[:, jumps] = interp_columns(inside, np.arange(last + 1), self._plans[i][:, jumps])
         whole = inside == np.floor(inside)
         values[whole] = self._plans[i, inside[whole].astype(int)]
         return np.asarray(values + outside)

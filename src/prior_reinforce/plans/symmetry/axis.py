@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.arrays import Plans, Point, Points
+from prior_reinforce.plans.interpolation import interp_columns
 from prior_reinforce.plans.kinematics import Chain, tool_tip
 from prior_reinforce.plans.symmetry.charts import Polar
 from prior_reinforce.plans.symmetry.moves import TurnIncrements, TurnPath, TurnPoses
@@ -144,7 +145,7 @@ def _around(path: Float[np.ndarray, "H 2"], half: int) -> Float[np.ndarray, "W 2
     frames, energy = np.arange(len(path)), np.square(np.diff(path, axis=0)).sum(axis=1)
     centre = (frames[:-1] + 0.5) @ energy / max(energy.sum(), 1e-12)
     at = centre + np.arange(-half, half + 1)
-    return np.stack([np.interp(at, frames, column) for column in path.T], axis=1)
+    return interp_columns(at, frames, path)
 
 
 def _left(window: Paths, place: Points, axis: Point) -> float:

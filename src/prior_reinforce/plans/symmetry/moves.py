@@ -20,7 +20,7 @@ from jaxtyping import Float
 from typing_extensions import Self
 
 from prior_reinforce.arrays import Frames
-from prior_reinforce.plans.interpolation import minimum_jerk
+from prior_reinforce.plans.interpolation import interp_columns, minimum_jerk
 from prior_reinforce.plans.kinematics import Chain, turned_path
 from prior_reinforce.plans.plan_format import stepped, summed
 
@@ -121,8 +121,8 @@ class Tempo(Move, frozen=True, tag="tempo"):
         moving = _MOVING * np.abs(steps).max(axis=0)
         for slope, beyond in ((steps[0], np.minimum(at, 0)), (steps[-1], np.maximum(at - last, 0))):
             out += beyond[:, None] * np.where(np.abs(slope) > moving, slope, 0.0)
-        for column in self.steps:
-            out[:, column] = np.interp(inside, np.arange(last + 1), path[:, column])
+        held = list(self.steps)
+        out[:, held] = interp_columns(inside, np.arange(last + 1), path[:, held])
         return out
 
 
@@ -157,8 +157,8 @@ class Delay(Move, frozen=True, tag="delay"):
 
     def _moved(self, plan: Frames, amount: float) -> Moved:
         out, index = plan.copy(), np.arange(len(plan))
-        for column in self.columns or range(plan.shape[1]):
-            out[:, column] = np.interp(index - amount * self.frames, index, plan[:, column])
+        later = [*(self.columns or range(plan.shape[1]))]
+        out[:, later] = interp_columns(index - amount * self.frames, index, plan[:, later])
         return out
 
 
