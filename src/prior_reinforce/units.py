@@ -12,6 +12,8 @@ from typing import Literal
 Kind = Literal["length", "angle", "time", "share"]
 """What a unit measures, in [m], [rad], [s] or [1]; angles repeat after a turn, the others do not.
 A unit that is not listed here counts something, and is a kind of its own."""
+NS_PER_S = 10**9
+"""Nanoseconds of a second, as ROS counts its times (builtin_interfaces/Time: sec, nanosec)."""
 STATED = 7.0
 """Numbers may be this many times larger where their unit is stated (ours): beyond, at eight turns
 of a joint or 35 m, it is stated wrongly."""

@@ -49,6 +49,7 @@ from prior_reinforce.arm.recordings.time_finder import FEWEST_COUNTS, Times
 from prior_reinforce.arm.recordings.units import Ambiguity, known_unit, say_names
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.plans.channels import Kind, kinds
+from prior_reinforce.units import NS_PER_S
 
 SUFFIXES = (".csv", ".tsv")
 IN_TEXT = (".txt", ".dat", ".log")
@@ -434,7 +435,7 @@ def _of_echo(table: Table) -> Table:
     if not texts or texts != [*range(2, texts[-1] + 1)]:
         return table
     stamps = table.values[:, :2]
-    if np.any(stamps != np.floor(stamps)) or np.any(stamps < 0) or np.any(stamps[:, 1] >= 10**9):
+    if np.any(stamps != np.floor(stamps)) or np.any(stamps < 0) or np.any(stamps[:, 1] >= NS_PER_S):
         return table
     frame = ["frame_id"] if table.names[texts[0]] == "column 3" else []
     count = len(texts) - len(frame)

@@ -21,6 +21,7 @@ from prior_reinforce.arm.recordings.recording import Beside, Positions, Recordin
 from prior_reinforce.arm.recordings.time_finder import SHIFT, Times, is_set_back, is_set_on
 from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.errors import ConfigurationError, FileFormatError
+from prior_reinforce.units import NS_PER_S
 
 _CLOCKS = {"header": "header stamps", "recorder": "the recorder's stamps"}
 _HEADER, _RECORDER = _CLOCKS
@@ -62,7 +63,7 @@ class Message(NamedTuple):
     def sent(self) -> int:
         """When its sender stamped it, in [ns]; 0 if it did not."""
         stamp = getattr(self.content.header, "stamp", None)
-        return 0 if stamp is None else stamp.sec * 10**9 + stamp.nanosec
+        return 0 if stamp is None else stamp.sec * NS_PER_S + stamp.nanosec
 
     def at(self, clock: str) -> int:
         """Time by one of the two clocks, in [ns]."""

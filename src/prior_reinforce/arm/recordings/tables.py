@@ -25,6 +25,7 @@ from prior_reinforce.arm.recordings.bounds import check_bytes, check_names, chec
 from prior_reinforce.arm.recordings.recording import named_damage
 from prior_reinforce.arm.recordings.units import known_unit, split_unit
 from prior_reinforce.errors import FileFormatError
+from prior_reinforce.units import NS_PER_S
 
 _Column = tuple[str, str | None, list[str]]
 """Name, unit and cells of a column."""
@@ -63,7 +64,7 @@ _SPAN = re.compile(
 )
 _NAN = ("nan", "+nan", "-nan")
 _NONE = ("none", "null", "na", "n/a", "-", "inf", "-inf")
-_DAY = 86_400 * 10**9
+_DAY = 86_400 * NS_PER_S
 """In [ns]."""
 _NO_NAME = re.compile(r"(Unnamed:.*)?")
 _SECOND_ROW_OF_UNITS = re.compile(r"[\[(]?[A-Za-zµμ°/^*·0-9.%-]{0,12}[\])]?")
@@ -302,7 +303,7 @@ def _moment(text: str) -> int | None:
     except ValueError:  # the 31st of February
         return None
     minutes = 60 * int(zone) + int(f"{zone[0]}{more}")
-    return int(moment.astype(np.int64)) - 60 * 10**9 * minutes
+    return int(moment.astype(np.int64)) - 60 * NS_PER_S * minutes
 
 
 def _span(text: str) -> int | None:
@@ -311,7 +312,7 @@ def _span(text: str) -> int | None:
         return None
     days, hours, minutes, seconds = (int(part or 0) for part in found.groups()[1:5])
     whole = ((24 * days + hours) * 60 + minutes) * 60 + seconds
-    return (whole * 10**9 + int((found[6] or "").ljust(9, "0"))) * (-1 if found[1] == "-" else 1)
+    return (whole * NS_PER_S + int((found[6] or "").ljust(9, "0"))) * (-1 if found[1] == "-" else 1)
 
 
 def is_value(text: str) -> bool:

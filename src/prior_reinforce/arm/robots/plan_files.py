@@ -29,6 +29,7 @@ from prior_reinforce.files import as_cell, open_npz, sha256, write_once
 from prior_reinforce.plans.interpolation import RATE, interpolate, join_frames
 from prior_reinforce.plans.motions import Plan
 from prior_reinforce.plans.plan_format import PlanFormat, stepped, summed
+from prior_reinforce.units import NS_PER_S
 
 PlanFileFormat = Literal["npz", "csv", "json"]
 _FILE_FORMAT = "prior-reinforce plan"
@@ -193,7 +194,7 @@ def _encode(plan: Plan, format: PlanFileFormat) -> bytes:
         # Each number is the shortest text that reads back as the same one.
         writer.writerows(np.column_stack([t, q, dq, ddq]).tolist())
         return text.getvalue().encode()
-    times = [divmod(round(seconds * 1e9), 10**9) for seconds in t.tolist()]
+    times = [divmod(round(seconds * NS_PER_S), NS_PER_S) for seconds in t.tolist()]
     points = [
         {
             "positions": q[k].tolist(),
