@@ -13,6 +13,7 @@ import numpy as np
 
 from prior_reinforce.arm.recordings.naming import OTHER_NAMES
 from prior_reinforce.arm.recordings.time_finder import (
+    ARRAY_TIMES,
     FRAME,
     Columns,
     FoundTimes,
@@ -40,8 +41,6 @@ if TYPE_CHECKING:
 TIME_UNITS = (*SECONDS, FRAME)
 NO_COLUMN = "none"
 """Value of `time_column` by which no times are read, and of `episode_column`."""
-_CALLED = ("t", "time", "timestamp", "timestamps")
-"""Names of arrays that are the times."""
 _IN_BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*[^\W\d_][^\[\]()]*?)\s*[\])]\s*$")
 """`Time [weeks]`, a word in brackets."""
 _QUALIFIES = re.compile(
@@ -274,7 +273,7 @@ def clock_among(
     if asked not in (None, NO_COLUMN, *arrays):
         raise FileFormatError(f"{where} has no array {asked}; it holds {sorted(arrays)}: name one")
     every = {name: (name, array) for name, array in arrays.items()}
-    called = [name for name in arrays if split_unit(name, SECONDS)[0] in _CALLED]
+    called = [name for name in arrays if split_unit(name, SECONDS)[0] in ARRAY_TIMES]
     fit = {n: own for n, own in every.items() if own[1].shape == (count,) and n not in motion}
     free = fit | {name: every[name] for name in called}
     found = find_times(where, free, called, no_motion=True)

@@ -19,6 +19,7 @@ from prior_reinforce.arm.recordings.clock import (
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.tables import Column, Table
 from prior_reinforce.arm.recordings.time_finder import (
+    COLUMN_TIMES,
     FEWEST_COUNTS,
     FRAME,
     FoundTimes,
@@ -33,10 +34,6 @@ from prior_reinforce.arm.recordings.time_finder import (
 from prior_reinforce.arm.recordings.units import SECONDS, known_unit, say_names, split_unit
 from prior_reinforce.errors import ConfigurationError
 
-_TIMES = (
-    "t", "time", "times", "timestamp", "timestamps", "stamp", "elapsed", "elapsed_time", "duration",
-    "datetime", "date", "zeit", "uhrzeit", "hora", "heure", "ora",
-)  # fmt: skip
 _DATES = ("date", "datum", "day", "fecha", "data")
 _SAYS = re.compile(
     r"([A-Za-z][A-Za-z_ ]*?)\s*[:=]\s*(\d+\.?\d*(?:[eE][-+]?\d+)?)(?![\d.:-]|,\d)\s*([A-Za-zµ]*)"
@@ -68,7 +65,8 @@ def _declared(table: Table, options: ReadOptions) -> dict[str, Any]:
 def with_whole_dates(table: Table) -> Table:
     """Return a table whose columns of dates and of times of day are one: `09.03.2024 23:58:00`."""
     found = {name.lower(): i for i, name in enumerate(table.names) if table.named}
-    date, time = (next((found[n] for n in own if n in found), None) for own in (_DATES, _TIMES))
+    called = _DATES, COLUMN_TIMES
+    date, time = (next((found[n] for n in own if n in found), None) for own in called)
     if date is None or time in (None, date) or not (table.is_text(date) and table.is_text(time)):
         return table
     both = [" ".join(each) for each in zip(table.cells[date], table.cells[time], strict=True)]
@@ -85,7 +83,7 @@ def called_times(table: Table, options: ReadOptions) -> list[int]:
         none = options.time_column == NO_COLUMN
         return [] if none else [named_column(table, options.time_column, "--time-column")]
     bare = (split_unit(name, SECONDS)[0].lower() for name in table.names)
-    found = [i for i, name in enumerate(bare) if name in _TIMES]
+    found = [i for i, name in enumerate(bare) if name in COLUMN_TIMES]
     return [i for i in found if len({*table.cells[i]}) > 1] or found  # a date alone stands still
 
 

@@ -34,13 +34,20 @@ _SHORTEST = 0.1
 """And at least. Ours."""
 _SLOWEST, _FASTEST = 1.0, 1e4
 """Frames a second beyond which a rate or a unit is doubted although somebody says it. Ours."""
+ARRAY_TIMES = ("t", "time", "timestamp", "timestamps")
+"""Names of arrays that are the times; fewer than of columns, since arrays may be of anything."""
+_WORDS = (*ARRAY_TIMES, "times", "stamp", "elapsed", "duration")
+COLUMN_TIMES = (
+    *_WORDS, "elapsed_time", "datetime", "date", "zeit", "uhrzeit", "hora", "heure", "ora",
+)  # fmt: skip
+"""Names of a table's columns that are the times."""
 _SAYS_TIME = re.compile(
-    r"(^|[^a-z])(t|ts|times?|timestamps?|stamp|epoch|clock|elapsed|duration|date|secs?|seconds?)"
-    r"($|[^a-z])"
+    rf"(^|[^a-z])({'|'.join(_WORDS)}|date|ts|epoch|clock|secs?|seconds?)($|[^a-z])"
     r"|[a-z]_?(time|stamp)(_?m?s|_?sec)?$|zeit|temps|tiempo|tempo|czas|sekund|secondes|segundos|врем"
     r"|时间|時間|時刻|时刻|시간",
     re.IGNORECASE,
 )
+"""Names that say a time among other words; whether it is that of the frames, the numbers tell."""
 _PERIOD = re.compile(
     r"((control|sampl[a-z]*|frame)[ _]?)?(dt|period|time[ _]?step|delta[ _]?t(ime)?)"
 )
