@@ -3,7 +3,9 @@
 import pickle
 from typing import Literal
 
-from prior_reinforce.errors import ConfigurationError, UnclearUnitsError, one_of
+import pytest
+
+from prior_reinforce.errors import ConfigurationError, UnclearUnitsError, one_of, warn_caller
 
 
 def test_a_remedy_is_carried_apart_and_said_behind_the_problem():
@@ -28,3 +30,12 @@ def test_unclear_units_are_settled_by_their_options():
 def test_values_of_a_literal_are_listed():
     assert one_of(Literal["a", "b"] | None) == "; use one of a, b"
     assert one_of(Literal["a"] | int) == ""
+
+
+def test_a_warning_is_of_the_line_outside_the_package_however_deep_it_comes_from():
+    inside = {"__name__": "prior_reinforce.anything", "warn_caller": warn_caller}
+    exec("def deep(n): deep(n - 1) if n else warn_caller('look here')", inside)
+    for n in (0, 5):
+        with pytest.warns(UserWarning, match="look here") as warned:
+            inside["deep"](n)
+        assert [each.filename for each in warned] == [__file__]

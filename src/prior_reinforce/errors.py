@@ -1,10 +1,12 @@
-"""Every error a caller can cause, in one tree.
+"""Every error a caller can cause, in one tree, and how a caller is warned.
 
 A message is one line that names the value, what was expected and the remedy; the command line
 prints it as it stands and exits with status 2, or 1 if something was written before it.
 """
 
-from types import NoneType
+import sys
+import warnings
+from types import FrameType, NoneType
 from typing import Any, Literal, get_args, get_origin
 
 
@@ -101,6 +103,16 @@ class RobotLimitError(PriorReinforceError, ValueError):
 
 class WorkspaceError(PriorReinforceError, RuntimeError):
     """A task folder on disk is missing, incomplete, locked, or inconsistent with its journal."""
+
+
+def warn_caller(message: str) -> None:
+    """Warn of the line outside this package that led here, through however many calls."""
+    frame: FrameType | None = sys._getframe()
+    level, package = 1, __name__.partition(".")[0]
+    # By module, since a data class's own `__init__` has no file.
+    while frame and str(frame.f_globals.get("__name__")).partition(".")[0] == package:
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, stacklevel=level)
 
 
 def one_of(hint: Any) -> str:

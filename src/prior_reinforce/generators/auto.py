@@ -11,13 +11,12 @@ them. Ours; on which evidence, reproduction/docs/decisions-generator.md tells.
 
 from __future__ import annotations
 
-import warnings
 from typing import Any, ClassVar
 
 from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans, Points, say_flat
-from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.errors import InvalidDemonstrationsError, warn_caller
 from prior_reinforce.generators.base import Generator, OnProgress, Wrapper
 from prior_reinforce.generators.interpolation import SmoothInterpolation, SmoothInterpolationConfig
 from prior_reinforce.generators.members import GENERATORS
@@ -56,7 +55,7 @@ class Auto(Wrapper):
 
     def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:
         if flat := say_flat(demonstrations.outcomes_seen):
-            warnings.warn(flat, stacklevel=7)  # who called `fit`, through `Equivariant`
+            warn_caller(flat)
         groups = patterns(demonstrations)
         ways = [group for group in groups if self._stands_alone(demonstrations, group)]
         left_out = sorted(set(range(demonstrations.n)) - {i for way in ways for i in way})

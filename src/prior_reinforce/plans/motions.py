@@ -15,7 +15,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -40,7 +39,12 @@ from prior_reinforce.arrays import (
     as_plans,
     check_spread,
 )
-from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError, InvalidPlanError
+from prior_reinforce.errors import (
+    FileFormatError,
+    InvalidDemonstrationsError,
+    InvalidPlanError,
+    warn_caller,
+)
 from prior_reinforce.files import open_npz
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.plans.plan_format import PlanFormat
@@ -205,7 +209,7 @@ class Demonstrations:
         elif len(outcomes) > 1:
             check_spread(outcomes)
         for oddity in () if _SAYS_NOTHING.get() else self._oddities(unit_stated=stated):
-            warnings.warn(oddity, stacklevel=3)
+            warn_caller(oddity)
 
     @property
     def n(self) -> int:
@@ -317,10 +321,9 @@ class Demonstrations:
             where = f"outside what was demonstrated; the nearest inside is {say_place(near, form)}"
             if self.symmetry is not None:
                 where = f"from where motions can be moved ({self.symmetry.name})"
-            warnings.warn(
+            warn_caller(
                 f"goal {say_place(goal, form)} lies {say_beyond(beyond, form)} {where}; check its "
-                "unit, or demonstrate nearer to it",
-                stacklevel=2,
+                "unit, or demonstrate nearer to it"
             )
         return goal
 
