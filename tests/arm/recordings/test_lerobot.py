@@ -56,6 +56,26 @@ def test_lerobot_with_a_missing_episode(tmp_path):
     np.testing.assert_allclose(result.demonstrations.outcomes_seen[3], OUTCOMES["4"])
 
 
+@pytest.mark.parametrize("version", ["v3.0", "v2.1"])
+def test_tasks_of_a_data_set_that_holds_several_are_told(tmp_path, version):
+    folder = write_lerobot(tmp_path / "set", version=version)
+    assert not any("task" in one for r in read_recordings(folder) for one in r.remarks)
+    tasks = [["throw"] if i < 4 else ["reset the table"] for i in range(N)]
+    if version == "v3.0":
+        (path,) = folder.glob("meta/episodes/**/*.parquet")
+        table = parquet.read_table(path).drop_columns("tasks")
+        parquet.write_table(table.append_column("tasks", pa.array(tasks)), path)
+    else:
+        path = folder / "meta" / "episodes.jsonl"
+        rows = [json.loads(line) for line in path.read_text().splitlines()]
+        path.write_text(
+            "\n".join(json.dumps(r | {"tasks": t}) for r, t in zip(rows, tasks, strict=True))
+        )
+    read = read_recordings(folder)
+    assert "its task is 'throw'" in read[0].remarks
+    assert "its task is 'reset the table'" in read[5].remarks
+
+
 def test_lerobot_whose_recorder_was_not_finalized(tmp_path):
     folder = write_lerobot(tmp_path / "set")
     path = folder / "data" / "chunk-000" / "file-000.parquet"

@@ -34,7 +34,7 @@ from prior_reinforce.plans.channels import Kind, kinds, says_no_position
 FrameNumbers = Shaped[np.ndarray, " T"]
 Frames = tuple[FrameNumbers, dict[str, Positions]]
 """Numbers and features of an episode's frames."""
-_MEASURED, _COMMANDED, _STAMPS = "observation.state", "action", "timestamp"
+_MEASURED, _COMMANDED, _STAMPS, _TASKS = "observation.state", "action", "timestamp", "tasks"
 _OWN = (_STAMPS, "frame_index", "episode_index", "index", "task_index")
 """Features that every data set has."""
 _LATE = 0.5
@@ -79,7 +79,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
     if not options.key and key == _MEASURED and _COMMANDED in features:
         remarks = (f"motion is {_MEASURED} (measured); key {_COMMANDED} has the commanded one",)
     columns = dict.fromkeys((*keys, *beside, _STAMPS))
-    lengths, frames = _listed_lengths(source), _frames(source, tuple(columns))
+    (lengths, tasks), frames = _listed(source), _frames(source, tuple(columns))
 
     def episode_of(number: int) -> Recording:
         index, arrays = frames.get(number, (np.zeros(0), {}))
@@ -94,8 +94,10 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         clocks = {n: a.ravel() for n, a in arrays.items() if a.size == len(a) and n not in keys}
         clock = _clock(source, str(number), index, clocks, rate, options)
         arrays = {n: a for n, a in arrays.items() if n != _STAMPS or n in keys}
+        of_tasks = (f"its task is {tasks[number]!r}",) * (len({*tasks.values()}) > 1)
+        why = (*remarks, *of_tasks)
         return recorded_among(
-            source, str(number), keys, arrays, options, texts=said, clock=clock, remarks=remarks
+            source, str(number), keys, arrays, options, texts=said, clock=clock, remarks=why
         )
 
     for number in sorted(lengths.keys() | frames.keys()):
@@ -165,18 +167,22 @@ def _widths(features: dict[str, Any]) -> dict[str, int]:
     }
 
 
-def _listed_lengths(source: Path) -> dict[int, int]:
-    """Frames of each episode according to the metadata; empty where it lists none."""
+def _listed(source: Path) -> tuple[dict[int, int], dict[int, str]]:
+    """Frames and task of each episode according to the metadata; empty where it lists none."""
     lengths: dict[int, int] = {}
+    tasks: dict[int, str] = {}
     meta = source / "meta"
     for path in (*sorted(meta.glob("episodes/**/*.parquet")), *meta.glob("episodes.jsonl")):
         with named_damage(path, "LeRobot's list of episodes"):
             if path.suffix == ".jsonl":
                 rows = list(map(json.loads, path.read_text(encoding="utf-8").splitlines()))
             else:
-                rows = _table(path, ["episode_index", "length"]).to_pylist()
-            lengths.update({int(row["episode_index"]): int(row["length"]) for row in rows})
-    return lengths
+                rows = _table(path, ["episode_index", "length", _TASKS]).to_pylist()
+            for row in rows:
+                number = int(row["episode_index"])
+                lengths[number] = int(row["length"])
+                tasks[number] = ", ".join(map(str, row.get(_TASKS) or ["not said"]))
+    return lengths, tasks
 
 
 def _frames(source: Path, keys: tuple[str, ...]) -> dict[int, Frames]:
@@ -218,7 +224,8 @@ def _table(path: Path, columns: list[str]) -> Any:
     file = parquet.ParquetFile(path)
     groups = [file.metadata.row_group(i) for i in range(file.metadata.num_row_groups)]
     parts = [group.column(j) for group in groups for j in range(group.num_columns)]
-    columns = [name for name in columns if name != _STAMPS or name in file.schema_arrow.names]
+    there = file.schema_arrow.names
+    columns = [name for name in columns if name not in (_STAMPS, _TASKS) or name in there]
     read = [part for part in parts if part.path_in_schema.split(".")[0] in {*columns}]
     check_numbers(path, "its columns", [sum(part.num_values for part in read)])
     check_bytes(path, sum(part.total_uncompressed_size for part in read), "unpacks to")
