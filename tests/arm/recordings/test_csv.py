@@ -8,8 +8,6 @@ import pytest
 
 from prior_reinforce.arm.recordings import import_demonstrations, read_recordings
 from prior_reinforce.arm.recordings.beside import moving_beside
-from prior_reinforce.arm.recordings.csv import with_heads
-from prior_reinforce.arm.recordings.tables import read_table
 from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
@@ -607,46 +605,6 @@ def test_lists_in_braces_are_read(tmp_path):
     np.testing.assert_allclose(recording.positions, q, atol=1e-6)
 
 
-def headed(tmp_path, *lines):
-    (tmp_path / "a.csv").write_text("\n".join(lines))
-    return with_heads(read_table(tmp_path / "a.csv"))
-
-
-def test_the_last_of_several_lines_may_say_units(tmp_path):
-    read = headed(tmp_path, "joint,pan,lift", "of,state,state", "time,deg,deg", "0,1,2", "1,3,4")
-    assert read.names == ("joint/of", "pan/state", "lift/state")
-    assert read.units == (None, "deg", "deg")
-    np.testing.assert_array_equal(read.values, [[0, 1, 2], [1, 3, 4]])
-
-
-@pytest.mark.parametrize("cell", ["None", "N/A", "nan", "2026-05-03"])
-def test_a_first_row_without_a_number_is_no_line_of_names(tmp_path, cell):
-    read = headed(tmp_path, "a,b,c", f"{cell},{cell},{cell}", "1,2,3")
-    assert (read.names, len(read)) == (("a", "b", "c"), 2)
-
-
-@pytest.mark.parametrize("frame", ["", "base_link"])
-@pytest.mark.parametrize("rest", [",nan,nan,nan,nan", ",0,0", ""])
-def test_an_echo_of_joint_states(tmp_path, frame, rest):
-    rows = [f"17,{k}00,{frame},pan,lift,{k},{-k}{rest}" for k in range(4)]
-    names = headed(tmp_path, *rows).names
-    assert names[:2] == ("sec", "nanosec")
-    assert names[-(2 + 2 + rest.count(",")) :][:4] == ("name0", "name1", "position0", "position1")
-
-
-@pytest.mark.parametrize(
-    "row",
-    [
-        "0.0{k},0.5,move,0.3",
-        "0.0{k},0.5,move,0.3,0.4",
-        "{k}.5,0.5,auto,swing,0.3",
-        "{k},-3,auto,swing,0.3,0.4",
-    ],
-)
-def test_rows_of_others_with_words_have_no_names(tmp_path, row):
-    assert not headed(tmp_path, *(row.format(k=k) for k in range(4))).named
-
-
 @pytest.mark.parametrize(
     "other",
     ["u,v,x\n1,2,3\n2,3,4", "k,fx\n1,2", "t,u,v\n0,1,2\n0.01,2,3", "joint,q\njoint1,\njoint2,"],
@@ -691,3 +649,15 @@ def test_numbers_of_episodes_that_begin_anew_with_a_session_are_refused(tmp_path
     path.write_text("\n".join(["t,session,trial,joint1", *rows]))
     with pytest.raises(FileFormatError, match=r"trial counts anew with session.*--episode-column"):
         read_recordings(path)
+
+
+def test_frames_that_a_column_calls_invalid_are_lost(tmp_path):
+    times, q = sampled(0, 50)
+    flag = np.where(np.isin(np.arange(len(q)), (20, 21)), 0, 1)
+    rows = np.column_stack([times, q, flag])
+    names = ",".join(["t", *JOINTS, "valid"])
+    np.savetxt(tmp_path / "0.csv", rows, delimiter=",", header=names, comments="")
+    (found,) = read_recordings(tmp_path)
+    assert found.names == tuple(JOINTS)
+    assert np.flatnonzero(np.isnan(found.positions).all(axis=1)).tolist() == [20, 21]
+    assert any("valid" in remark for remark in found.remarks)

@@ -12,6 +12,7 @@ from prior_reinforce.arm.recordings.stated import (
     names_said,
     recorded_among,
     units_said,
+    without_invalid,
 )
 from prior_reinforce.errors import FileFormatError
 from tests.arm.recordings.recorded import UR, Q
@@ -50,6 +51,15 @@ def test_texts_that_contradict_each_other_are_refused():
         ({"meta.units": ("deg",)}, ("deg", "deg", None)),
         ({"meta.outcome_units": ("m",), "meta.object.unit": ("m",)}, (None,) * 3),
         ({"units": ("deg", "deg", "counts")}, ("deg", "deg", None)),
+        (
+            {
+                "meta.units.lift": ("deg",),
+                "meta.units.pan": ("rad",),
+                "meta.units.gripper": ("mm",),
+            },
+            ("rad", "deg", "mm"),
+        ),
+        ({"units.lift": ("deg",), "units.pan": ("rad",)}, (None,) * 3),
     ],
 )
 def test_units_in_words_are_of_the_columns(texts, units):
@@ -77,6 +87,19 @@ def test_a_number_of_frames_or_a_mask_says_what_is_padding(stated, kept):
     q = np.where(np.arange(101)[:, None] < 80, Q, 0.0)
     found, said = frames_said("a", "q", {"q": q, **stated}, 101)
     assert (found, len(said)) == (kept, int(kept < 101))
+
+
+@pytest.mark.parametrize("called", ["valid", "observations/is_valid", "tracked"])
+def test_frames_that_were_not_measured_by_a_flag_are_lost(called):
+    flag = np.ones(101)
+    flag[[0, 1, 50]] = 0
+    found = recorded_among(
+        Path("a.npz"), "0", ("q",), {"q": Q, "t": np.arange(101) / 50, called: flag}, ReadOptions(),
+        texts={}, names=UR,
+    )  # fmt: skip
+    assert np.flatnonzero(np.isnan(found.positions).all(axis=1)).tolist() == [0, 1, 50]
+    whole = without_invalid(Q, {called: flag * 2, "valid": np.ones(3), "invalid": flag})
+    np.testing.assert_array_equal(whole, Q)
 
 
 def test_nan_to_the_end_of_every_joint_is_padding_and_within_is_not():

@@ -10,7 +10,6 @@ import contextlib
 import re
 import shlex
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -35,7 +34,13 @@ from prior_reinforce.arm.recordings.recording import (
     unread,
     without_units,
 )
-from prior_reinforce.arm.recordings.stated import headed, names_said, refuse_rates
+from prior_reinforce.arm.recordings.stated import (
+    names_said,
+    refuse_rates,
+    says_valid,
+    without_invalid,
+)
+from prior_reinforce.arm.recordings.table_heads import headed, with_heads
 from prior_reinforce.arm.recordings.table_times import (
     called_times,
     clock_of_table,
@@ -44,12 +49,11 @@ from prior_reinforce.arm.recordings.table_times import (
     time_columns,
     with_whole_dates,
 )
-from prior_reinforce.arm.recordings.tables import PLAIN, Table, are_units, is_value, read_table
+from prior_reinforce.arm.recordings.tables import PLAIN, Table, read_table
 from prior_reinforce.arm.recordings.time_finder import FEWEST_COUNTS, Times
-from prior_reinforce.arm.recordings.units import Ambiguity, known_unit, say_names
+from prior_reinforce.arm.recordings.units import Ambiguity, say_names
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.plans.channels import Kind, kinds
-from prior_reinforce.units import NS_PER_S
 
 SUFFIXES = (".csv", ".tsv")
 IN_TEXT = (".txt", ".dat", ".log")
@@ -60,8 +64,6 @@ _MOST_WORDS = 8
 """Texts between which a column switches. Ours."""
 _FEW_FILES = 4
 """Files of a folder that are read again to tell whether one is unlike. Ours."""
-_ECHOED = ("name", "position", "velocity", "effort")
-"""Arrays of a sensor_msgs/JointState, in order."""
 
 
 class LogFormat(NamedTuple):
@@ -270,13 +272,16 @@ def _episode(
     if not all_read:  # else only those that change between a few: `on` and `off`
         texts = [i for i in texts if 1 < len({*table.cells[i]} - {""}) <= _MOST_WORDS]
     absent = [i for i in channels if found is None and np.all(table.values[:, i] == _ABSENT)]
+    flags = [i for i in others if table.named and says_valid(called[i])]
     for left, why in (
+        (flags, "says which frames were measured"),
         (absent, "is 9E+09 all along, as ABB writes of an axis that is not there"),
         (rising, "rises with every row, as times and counters do"),
         (texts, "holds no number"),
     ):
         channels = [i for i in channels if i not in left]
         remarks += [f"{say_names([called[i] for i in left])} left out, which {why}"] * bool(left)
+    measured = {called[i]: table.values[:, i] for i in flags}
     twins = all_read and twin_vectors([called[i] for i in channels], table.values[:, channels])
     own, units = without_units([called[i] for i in channels])
     is_named = named or said.keys() >= {*channels}
@@ -287,7 +292,7 @@ def _episode(
     return recorded(
         episode,
         clock,
-        table.columns(channels),
+        without_invalid(table.columns(channels), measured),
         tuple(own_names),
         named=is_named,
         remarks=tuple(remarks),
@@ -398,53 +403,3 @@ def _by_key(
         rest = iter(columns)
         columns = [by_name[j] if j in by_name else next(rest) for j in joints]
     return columns
-
-
-def with_heads(table: Table) -> Table:
-    """Return a table under one line of names, wherever its own stand."""
-    return _of_echo(_of_levels(table))
-
-
-def _of_levels(table: Table) -> Table:
-    """Join further lines of names, as pandas writes of columns of several levels: `elbow/position`.
-
-    Such lines hold no number, date or `nan`, and the next one does. The last may say units.
-    """
-    are_numbers = ~np.isnan(table.values)
-    rows = int(np.argmax(are_numbers.any(axis=1))) if table.named and are_numbers.size else 0
-    lines = [[cells[row] for cells in table.cells] for row in range(rows)]
-    if not lines or any(is_value(cell) for line in lines for cell in line):
-        return table
-    units = table.units
-    if are_units(lines[-1], table.decimal):
-        units = tuple(map(known_unit, lines.pop()))
-    levels = zip(table.names, *lines, strict=True)
-    names = tuple("/".join(filter(None, level)) for level in levels)
-    return replace(table.rows(range(rows, len(table))), names=names, units=units)
-
-
-def _of_echo(table: Table) -> Table:
-    """Name what `ros2 topic echo --csv` writes of a JointState; return others as they are.
-
-    A row is the stamp in s and ns, the frame's name (column 3, which is no column where it is
-    empty), the joints' names, and as many positions; then velocities and efforts, if there are any.
-    """
-    if table.named:
-        return table
-    texts = [i for i, cells in enumerate(table.cells) if any(map(_is_word, cells))]
-    if not texts or texts != [*range(2, texts[-1] + 1)]:
-        return table
-    stamps = table.values[:, :2]
-    if np.any(stamps != np.floor(stamps)) or np.any(stamps < 0) or np.any(stamps[:, 1] >= NS_PER_S):
-        return table
-    frame = ["frame_id"] if table.names[texts[0]] == "column 3" else []
-    count = len(texts) - len(frame)
-    groups, rest = divmod(len(table.names) - 1 - texts[-1], max(count, 1))
-    if count == 0 or rest or not 1 <= groups < len(_ECHOED):
-        return table
-    heads = [f"{of}{i}" for of in _ECHOED[: 1 + groups] for i in range(count)]
-    return replace(table, names=("sec", "nanosec", *frame, *heads), named=True)
-
-
-def _is_word(cell: str) -> bool:
-    return any(map(str.isalpha, cell)) and not is_value(cell)

@@ -9,7 +9,6 @@ import math
 import re
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from operator import getitem
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,14 +16,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from prior_reinforce.arm.recordings.beside import MASK, Arrays, arrays_beside, may_move
-from prior_reinforce.arm.recordings.bounds import check_names
 from prior_reinforce.arm.recordings.clock import Clock, clock_among
 from prior_reinforce.arm.recordings.naming import (
     OTHER_NAMES,
     Texts,
     find_channels,
     missing_channels,
-    said_in,
 )
 from prior_reinforce.arm.recordings.recording import (
     Positions,
@@ -33,14 +30,12 @@ from prior_reinforce.arm.recordings.recording import (
     refuse_exchanged,
     without_units,
 )
-from prior_reinforce.arm.recordings.tables import Table
-from prior_reinforce.arm.recordings.time_finder import rises, says_time
+from prior_reinforce.arm.recordings.time_finder import says_time
 from prior_reinforce.arm.recordings.units import (
     CHANNEL_UNITS,
     Ambiguity,
     known_unit,
     say_names,
-    split_unit,
 )
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.plans.channels import (
@@ -51,7 +46,6 @@ from prior_reinforce.plans.channels import (
     one_for_all,
     says_no_position,
 )
-from prior_reinforce.plans.whole_turns import TURN
 
 if TYPE_CHECKING:
     from prior_reinforce.arm.recordings.options import ReadOptions
@@ -60,28 +54,23 @@ _NAMES = re.compile(r"name|joint|dof|motor|actuator|channel|column|label|ax[ei]s
 _FRAMES = re.compile(
     r"lengths?|(n|num)_?(frames|steps|samples)|(episode|traj|trajectory|sequence)_(len|lengths?)"
 )
-_OUTCOME = re.compile(r"(.*[^a-z])?(outcomes?|landings?|landed)([^a-z].*)?", re.IGNORECASE)
+OUTCOME = re.compile(r"(.*[^a-z])?(outcomes?|landings?|landed)([^a-z].*)?", re.IGNORECASE)
 """What an array of where objects landed is called."""
-_JOINTS = r"(joint|angle|angular|position|motion|rotation|q)s?"
-_UNIT = re.compile(rf"(.*\.)?(({_JOINTS}_?)*units?|units?\.({_JOINTS}_?)+)", re.IGNORECASE)
+JOINT_WORDS = r"(joint|angle|angular|position|motion|rotation|q)s?"
+_UNIT = re.compile(rf"(.*\.)?(({JOINT_WORDS}_?)*units?|units?\.({JOINT_WORDS}_?)+)", re.IGNORECASE)
 """What the joints' units are called among others, deep in what a file says of itself."""
-_UNIT_OF_ALL = re.compile(
-    rf"(?:^[#%/]+|[,;.])\W*(?:({_JOINTS}|winkel|units?|values|all|the|of|are|is|given|in)(?![a-z])[\W_]*)*"
-    r"(?P<units>(?:[a-z]+|°)(?:\s*[,;]\s*(?:[a-z]+|°))*)\s*(?:[\])](?!\s*[:=])|$|[,;.](?!\d))",
-    re.IGNORECASE,
-)
-"""A part of a comment that is the unit of all and of nothing else: `# joint angles in deg`, `# t in
-s, q in deg`, `# deg`; no `camera angles in deg`, and no `angle [deg]: 30`."""
+_IN_UNITS = re.compile(r"(^|[._])units?\.[^.]+$", re.IGNORECASE)
+"""Where a channel's own unit stands among those of all, `meta.units.elbow`."""
 _SOUND, _FASTER = 1_000_000, 20
 """Numbers of what moves at another rate than the motion, at most, and how many times the motion's,
 if that is more. Ours: sound has more."""
 _FAR_OFF, _SLACK = 5.0, 0.01
 """Standard deviations by which the middle of a motion is off what is said of its mean, and rounding
 of what is said. Ours: a motion is one of those of which it is said."""
+_VALID = re.compile(r"((is|frame|pose|data)_)?(valid|tracked)(_(mask|flag))?")
+"""Flags that are 0 in frames that were not measured."""
 _STEMS = re.compile("[/.]")
 """What parts an array's own name from where it is: `observations/q`, `stats.q_mean`."""
-_MOST_SAID = 1_000_000
-"""Bytes of a JSON beside a table at most. Ours: it says what the columns are."""
 
 
 def by_field(
@@ -111,7 +100,7 @@ def motion_keys(
     shapes = {name: own.shape for name, own in arrays.items() if own.dtype.kind in "fiu"}
     single = [name for name, shape in shapes.items() if len(shape) == 1]
     fit = sorted(name for name, shape in shapes.items() if 2 <= len(shape) <= most)
-    there = [name for name in fit if not _OUTCOME.fullmatch(name)]
+    there = [name for name in fit if not OUTCOME.fullmatch(name)]
     keys = options.key or tuple(name for name in usual if name in shapes)[:1]
     keys = keys or tuple(single[i] for i in find_channels(options.joints or (), single) or ())
     keys = keys or tuple(there if len(there) == 1 and not says_no_position(there[0]) else ())
@@ -172,6 +161,7 @@ def recorded_among(
         for each in (arrays, stated)
     )
     positions, known = _joined(where, keys, arrays, texts, options.joints)
+    positions = without_invalid(positions, arrays)
     if options.units is None:
         _refuse_normalised(f"{where}: {episode}", positions, {**stated, **arrays}, keys)
     bare, units = without_units(names or known)
@@ -317,6 +307,9 @@ def names_said(
 
 def units_said(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
     """Return the unit of each column as texts state it; a single one for all that can be in it."""
+    by_name = {key.rpartition(".")[2]: own for key, own in texts.items() if _IN_UNITS.search(key)}
+    if {*names} <= by_name.keys():  # {"units": {"elbow": "deg", ...}}
+        texts = {"units": tuple(by_name[name][0] for name in names)}
     for key, own in texts.items():
         if "unit" not in key.lower() or says_time(key) or len(own) not in (1, len(names)):
             continue
@@ -330,43 +323,18 @@ def units_said(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
     return (None,) * len(names)
 
 
-def headed(table: Table, joints: Sequence[str] | None = None) -> Table:
-    """Return a table with heads and units that its comments, or a JSON beside it, say.
+def says_valid(name: str) -> bool:
+    """Whether a flag is by its name 0 in frames that were not measured: `is_valid`, `tracked`."""
+    return _VALID.fullmatch(_STEMS.split(name.lower())[-1]) is not None
 
-    The JSON is called as the table, or is the only one of the folder. Names of all columns but the
-    first are taken if that one rises, as times do. Heads of the table's own count more, and a
-    single unit for all is only one of angles.
-    """
-    where = path = Path(table.where)
-    texts = dict[str, tuple[str, ...]]()
-    found = [path.with_suffix(".json")]
-    if not found[0].is_file():
-        found = [p for p in path.parent.glob("*.json") if not p.with_suffix(path.suffix).exists()]
-    if len(found) == 1 and found[0].stat().st_size <= _MOST_SAID:
-        where, texts = found[0], said_in({"": found[0].read_bytes()})[0]
-    names = table.names if table.named else names_said(where, texts, len(table.names), joints)
-    if not names and texts and len(table) and rises(table.stamps(0)):
-        names = names_said(where, texts, len(table.names) - 1, joints)
-        names = ("t", *names) if names else ()
-    if not names:
-        return table
-    check_names(where, names)
-    texts = {f".{key}": own for key, own in texts.items()}
-    of_motion = [line for line in table.comments if not _OUTCOME.fullmatch(line)]
-    said = " ".join(one["units"] for line in of_motion for one in _UNIT_OF_ALL.finditer(line))
-    angles = {*map(known_unit, re.split(r"[\s,;]+", said))} & TURN.keys()
-    if len(angles) == 1:
-        texts |= {"units": tuple(map(str, angles))}
-    if table.named:
-        texts = {k: own for k, own in texts.items() if len(own) > 1 or known_unit(own[0]) in TURN}
-    units = units_said(texts, names)
-    if not any(units):  # of the columns but the time's
-        units = (None, *units_said(texts, names[1:]))
-    units = tuple(
-        own or (None if says_time(name) or split_unit(name, any_word=True)[1] else unit)
-        for name, own, unit in zip(names, table.units, units, strict=True)
-    )
-    return replace(table, names=names, units=units, named=True)
+
+def without_invalid(positions: Positions, flags: Arrays) -> Positions:
+    """Return a motion (T, D) that is nan in frames which a flag (T,) says were not measured."""
+    positions = positions.copy()
+    for name, flag in flags.items():
+        if says_valid(name) and flag.shape == positions.shape[:1] and np.all(np.isin(flag, (0, 1))):
+            positions[flag == 0] = np.nan
+    return positions
 
 
 def other_count(where: str, declared: str, key: str, count: int) -> FileFormatError:
@@ -389,7 +357,8 @@ def frames_said(
     for name, value in stated.items():
         own, numbers = name.rpartition("/")[2].lower(), np.asarray(value)
         n = count
-        if MASK.fullmatch(own) and numbers.shape == (count,) and numbers.dtype.kind in "biuf":
+        flags = MASK.fullmatch(own) and numbers.shape == (count,) and numbers.dtype.kind in "biuf"
+        if flags and not (says_valid(own) and numbers[0] == 0):
             real = numbers.astype(bool) == bool(numbers[0])
             n = int(np.argmin(np.append(real, False)))
             n = count if np.any(real[n:]) else n

@@ -1,0 +1,120 @@
+"""What the columns of a table are called: by its first lines, comments, or a JSON beside it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from prior_reinforce.arm.recordings.bounds import check_names
+from prior_reinforce.arm.recordings.naming import said_in
+from prior_reinforce.arm.recordings.stated import JOINT_WORDS, OUTCOME, names_said, units_said
+from prior_reinforce.arm.recordings.tables import Table, are_units, is_value
+from prior_reinforce.arm.recordings.time_finder import rises, says_time
+from prior_reinforce.arm.recordings.units import known_unit, split_unit
+from prior_reinforce.plans.whole_turns import TURN
+from prior_reinforce.units import NS_PER_S
+
+_ECHOED = ("name", "position", "velocity", "effort")
+"""Arrays of a sensor_msgs/JointState, in order."""
+_UNIT_OF_ALL = re.compile(
+    rf"(?:^[#%/]+|[,;.])\W*(?:({JOINT_WORDS}|winkel|units?|values|all|the|of|are|is|given|in)(?![a-z])[\W_]*)*"
+    r"(?P<units>(?:[a-z]+|°)(?:\s*[,;]\s*(?:[a-z]+|°))*)\s*(?:[\])](?!\s*[:=])|$|[,;.](?!\d))",
+    re.IGNORECASE,
+)
+"""A part of a comment that is the unit of all and of nothing else: `# joint angles in deg`, `# t in
+s, q in deg`, `# deg`; no `camera angles in deg`, and no `angle [deg]: 30`."""
+_MOST_SAID = 1_000_000
+"""Bytes of a JSON beside a table at most. Ours: it says what the columns are."""
+
+
+def headed(table: Table, joints: Sequence[str] | None = None) -> Table:
+    """Return a table with heads and units that its comments, or a JSON beside it, say.
+
+    The JSON is called as the table, or is the only one of the folder. Names of all columns but the
+    first are taken if that one rises, as times do. Heads of the table's own count more, and a
+    single unit for all is only one of angles.
+    """
+    where = path = Path(table.where)
+    texts = dict[str, tuple[str, ...]]()
+    found = [path.with_suffix(".json")]
+    if not found[0].is_file():
+        found = [p for p in path.parent.glob("*.json") if not p.with_suffix(path.suffix).exists()]
+    if len(found) == 1 and found[0].stat().st_size <= _MOST_SAID:
+        where, texts = found[0], said_in({"": found[0].read_bytes()})[0]
+    names = table.names if table.named else names_said(where, texts, len(table.names), joints)
+    if not names and texts and len(table) and rises(table.stamps(0)):
+        names = names_said(where, texts, len(table.names) - 1, joints)
+        names = ("t", *names) if names else ()
+    if not names:
+        return table
+    check_names(where, names)
+    texts = {f".{key}": own for key, own in texts.items()}
+    of_motion = [line for line in table.comments if not OUTCOME.fullmatch(line)]
+    said = " ".join(one["units"] for line in of_motion for one in _UNIT_OF_ALL.finditer(line))
+    angles = {*map(known_unit, re.split(r"[\s,;]+", said))} & TURN.keys()
+    if len(angles) == 1:
+        texts |= {"units": tuple(map(str, angles))}
+    if table.named:
+        texts = {k: own for k, own in texts.items() if len(own) > 1 or known_unit(own[0]) in TURN}
+    units = units_said(texts, names)
+    if not any(units):  # of the columns but the time's
+        units = (None, *units_said(texts, names[1:]))
+    units = tuple(
+        own or (None if says_time(name) or split_unit(name, any_word=True)[1] else unit)
+        for name, own, unit in zip(names, table.units, units, strict=True)
+    )
+    return replace(table, names=names, units=units, named=True)
+
+
+def with_heads(table: Table) -> Table:
+    """Return a table under one line of names, wherever its own stand."""
+    return _of_echo(_of_levels(table))
+
+
+def _of_levels(table: Table) -> Table:
+    """Join further lines of names, as pandas writes of columns of several levels: `elbow/position`.
+
+    Such lines hold no number, date or `nan`, and the next one does. The last may say units.
+    """
+    are_numbers = ~np.isnan(table.values)
+    rows = int(np.argmax(are_numbers.any(axis=1))) if table.named and are_numbers.size else 0
+    lines = [[cells[row] for cells in table.cells] for row in range(rows)]
+    if not lines or any(is_value(cell) for line in lines for cell in line):
+        return table
+    units = table.units
+    if are_units(lines[-1], table.decimal):
+        units = tuple(map(known_unit, lines.pop()))
+    levels = zip(table.names, *lines, strict=True)
+    names = tuple("/".join(filter(None, level)) for level in levels)
+    return replace(table.rows(range(rows, len(table))), names=names, units=units)
+
+
+def _of_echo(table: Table) -> Table:
+    """Name what `ros2 topic echo --csv` writes of a JointState; return others as they are.
+
+    A row is the stamp in s and ns, the frame's name (column 3, which is no column where it is
+    empty), the joints' names, and as many positions; then velocities and efforts, if there are any.
+    """
+    if table.named:
+        return table
+    texts = [i for i, cells in enumerate(table.cells) if any(map(_is_word, cells))]
+    if not texts or texts != [*range(2, texts[-1] + 1)]:
+        return table
+    stamps = table.values[:, :2]
+    if np.any(stamps != np.floor(stamps)) or np.any(stamps < 0) or np.any(stamps[:, 1] >= NS_PER_S):
+        return table
+    frame = ["frame_id"] if table.names[texts[0]] == "column 3" else []
+    count = len(texts) - len(frame)
+    groups, rest = divmod(len(table.names) - 1 - texts[-1], max(count, 1))
+    if count == 0 or rest or not 1 <= groups < len(_ECHOED):
+        return table
+    heads = [f"{of}{i}" for of in _ECHOED[: 1 + groups] for i in range(count)]
+    return replace(table, names=("sec", "nanosec", *frame, *heads), named=True)
+
+
+def _is_word(cell: str) -> bool:
+    return any(map(str.isalpha, cell)) and not is_value(cell)
