@@ -70,6 +70,7 @@ def test_later_trials_tell_a_moved_table_from_a_moved_goal(moved):
         assert (change.goal is None) == all_moved
 
 
+@pytest.mark.slow
 def test_two_throws_that_came_down_alike_were_not_both_told_wrongly():
     adapter, far = started(), Reading.measured([0.7, 0.5], 0.002)
     for number in range(4):

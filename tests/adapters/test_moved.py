@@ -469,6 +469,7 @@ def test_a_goal_farther_than_motions_can_be_moved_is_named():
     assert "is nearer than" in adapter.expect(adapter.propose(near), near, TOLERANCE).remark
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shown", [SHOWN, FOUR])
 def test_what_was_measured_to_miss_is_not_tried_again_whatever_is_believed(shown):
     """Everything lands at one place."""
@@ -481,6 +482,7 @@ def test_what_was_measured_to_miss_is_not_tried_again_whatever_is_believed(shown
         tried = np.vstack([tried, condition])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("goal", "word"), [(2.5, "farther"), (0.4, "nearer"), (1.2, None)])
 def test_a_goal_farther_than_what_is_learned_reaches_is_named(goal, word):
     adapter = Arm(shown=demonstrations(FOUR, turn_and_scale(TurnJoint(), scale=Learned()))).adapter

@@ -56,6 +56,7 @@ def test_lerobot_with_a_missing_episode(tmp_path):
     np.testing.assert_allclose(result.demonstrations.outcomes_seen[3], OUTCOMES["4"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", ["v3.0", "v2.1"])
 def test_tasks_of_a_data_set_that_holds_several_are_told(tmp_path, version):
     folder = write_lerobot(tmp_path / "set", version=version)
