@@ -175,10 +175,13 @@ class InUse:
         wanted: Point,
         plan: Frames,
         verdict_on: Callable[[Frames, Point, str], Verdict | None],
+        *,
+        may_repeat: bool,
     ) -> tuple[Asked, Frames, Any]:
         """The next trial, its plan and verdict: as wanted, or the last that passes towards that.
 
-        OutOfReachError if no plan may be moved to the goal, and this one was tried and missed;
+        OutOfReachError if plans do not reach the goal, and this one was tried and missed, unless it
+        may be repeated;
         RobotLimitError if it does not pass, and the goal's own plan does not either, or the last
         that passes was tried and missed.
         """
@@ -207,7 +210,7 @@ class InUse:
             limited = f"moved only as far as passes, which may not do ({own.problem}); {nearer}"
             verdict = verdict_on(plan, nearest, self._say_no_plan(state, nearest))
             return self._asked(state, nearest, verdict, limited), plan, verdict
-        if verdict is not None and (n := _missed(state, wanted)):
+        if not may_repeat and (n := _missed(state, wanted)):
             expected = self._expected(state, wanted)
             if expected.beyond:
                 raise OutOfReachError(f"trial {n} made the same plan and missed: {expected.remark}")

@@ -230,12 +230,12 @@ class Session:
             The trial, with its plan and the gate's verdict on it.
 
         Raises:
-            OutOfReachError: No plan may be moved so far, and the farthest missed.
+            OutOfReachError: Plans go no farther, and the last that does missed.
             RobotLimitError: The plan breaks a limit of the robot.
             TrialStateError: The open trial may not be given out again (`check_open`).
             WorkspaceError: No goal is set, or the log cannot be written.
         """
-        return ask_all([self])[0]
+        return _ask([self], may_repeat=False)[0]
 
     def tell(
         self, number: int, seen: Reading | ArrayLike | None = None, *, hit: bool | None = None
@@ -375,10 +375,12 @@ class Session:
             self._check_open(trial, verb)
 
     def _open(
-        self, state: SessionState, parts: InUse, condition: Point, plan: Frames
+        self, state: SessionState, parts: InUse, condition: Point, plan: Frames, may_repeat: bool
     ) -> Verdict | None:
         """Write a new trial down, if its plan may be executed."""
-        event, plan, verdict = parts.passing(state, condition, plan, self._verdict)
+        event, plan, verdict = parts.passing(
+            state, condition, plan, self._verdict, may_repeat=may_repeat
+        )
         self.log.keep_adapter(parts.adapter)
         self.log.append_asked(event, plan, parts.demonstrations.format)
         return verdict
@@ -414,6 +416,9 @@ class Session:
 def ask_all(sessions: Sequence[Session]) -> list[Trial]:
     """Ask many sessions at once: one call of each generator for all that have no open trial.
 
+    Without a gate, a goal that plans do not reach is tried again all the same, unlike `ask`: one of
+    many does not end the others.
+
     Args:
         sessions: Different sessions; those that share a generator share its call.
 
@@ -423,6 +428,10 @@ def ask_all(sessions: Sequence[Session]) -> list[Trial]:
     Raises:
         ConfigurationError: A session stands there twice.
     """
+    return _ask(sessions, may_repeat=True)
+
+
+def _ask(sessions: Sequence[Session], *, may_repeat: bool) -> list[Trial]:
     if len({id(session) for session in sessions}) < len(sessions):
         raise ConfigurationError("sessions asked together must be different ones")
     for session in sessions:
@@ -447,7 +456,8 @@ def ask_all(sessions: Sequence[Session]) -> list[Trial]:
             plans = generated([each.generator for each in parts], conditions)
             opened = zip(new.items(), parts, conditions, plans, strict=True)
             for (session, state), each, condition, plan in opened:
-                verdicts[session] = session._open(state, each, condition, plan)
+                again = may_repeat and session._gate is None
+                verdicts[session] = session._open(state, each, condition, plan, again)
     return [
         session._with_plan(state, number, verdicts)
         for session, (state, number) in zip(sessions, asked, strict=True)
