@@ -20,7 +20,6 @@ from prior_reinforce.arm.recordings import (
 )
 from prior_reinforce.arm.recordings.outcomes import (
     OUTCOMES_FILE,
-    Outcomes,
     missing_outcomes,
     table_beside,
     write_outcome_table,
@@ -132,7 +131,8 @@ class Import(OnWorkspace):
         self, workspace: Workspace, wanted: Wanted, recordings: Recordings, selection: Selection
     ) -> None:
         form, at_terminal = workspace.manifest.outcome_format, sys.stdin.isatty()
-        known, unclear = self._known(wanted, recordings, selection, may_lack=at_terminal)
+        given = self.outcomes, self.outcome_unit
+        known, unclear = recordings.outcomes(selection, wanted, *given, may_lack=at_terminal)
         _settle(unclear, at_terminal=at_terminal)
         if at_terminal:
             source = recordings.source
@@ -162,19 +162,12 @@ class Import(OnWorkspace):
         else:
             print_next(workspace)
 
-    def _known(
-        self, wanted: Wanted, recordings: Recordings, selection: Selection, *, may_lack: bool
-    ) -> tuple[Outcomes, Unclear]:
-        """The outcomes, and all that is only guessed."""
-        said, unclear = (self.outcomes, self.outcome_unit), selection.ambiguities
-        found, more = recordings.outcomes(wanted, *said, unclear=unclear, may_lack=may_lack)
-        return found, unclear + more
-
     def _inspect(self, wanted: Wanted, recordings: Recordings, selection: Selection) -> None:
         found = inspect(selection, wanted)
         places, episodes = recordings.outcome_places, selection.episodes
         table = self.outcomes or table_beside(places)
-        known, unclear = self._known(wanted, recordings, selection, may_lack=True)
+        given = self.outcomes, self.outcome_unit
+        known, unclear = recordings.outcomes(selection, wanted, *given, may_lack=True)
         found = replace(found, selection=replace(found.selection, ambiguities=unclear))
         missing = missing_outcomes(episodes, known)
         said = f"{known.where}, {', '.join(missing) or 'none'} missing"

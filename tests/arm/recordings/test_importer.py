@@ -207,6 +207,8 @@ def test_all_that_is_unclear_is_said_at_once(tmp_path):
     with pytest.raises(UnclearUnitsError) as caught:
         import_demonstrations(tmp_path)
     assert "add: --time-unit ms --units deg; and no outcomes for episodes" in str(caught.value)
+    with pytest.raises(InvalidDemonstrationsError, match=r"^no outcomes for episodes"):
+        import_demonstrations(tmp_path, take_guesses=True)
 
 
 @pytest.mark.slow

@@ -232,8 +232,7 @@ class Imports:
         if joints is not None and first.named and _needs_choice(joints, first.names):
             raise _OtherNamesError(wanted.names or joints, first.names)
         selection = recordings.select(wanted)
-        known, unclear = recordings.outcomes(wanted, may_lack=True)
-        unclear += selection.ambiguities
+        known, unclear = recordings.outcomes(selection, wanted, may_lack=True)
         rows = places_of(selection.episodes, known)
         return _Found(recordings, selection, rows, unclear)
 

@@ -49,8 +49,6 @@ from prior_reinforce.extras import check_installed
 from prior_reinforce.files import refuse_pointers
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.plan_format import PlanFormat
-from prior_reinforce.plans.symmetry import Symmetry
 from prior_reinforce.wording import as_html, listed
 
 
@@ -69,6 +67,8 @@ class Format:
     """A folder laid out like this is this format, whatever else lies in it."""
 
 
+GivenOutcomes = str | os.PathLike[str] | Mapping[str, Sequence[float]] | None
+"""A table of outcomes, numbers by episode in the wanted units, or what is found beside."""
 _OF_TABLES = frozenset({"episode_column", "delimiter", "decimal"})
 FORMATS: Mapping[str, Format] = {
     "npz": Format(npz.read, partial(has_files, suffixes=npz.SUFFIXES)),
@@ -104,7 +104,7 @@ class ImportResult:
 def import_demonstrations(
     source: str | os.PathLike[str],
     *,
-    outcomes: str | os.PathLike[str] | Mapping[str, Sequence[float]] | None = None,
+    outcomes: GivenOutcomes = None,
     outcome_names: Sequence[str] | None = None,
     outcome_units: Sequence[str] | None = None,
     outcome_unit: str | None = None,
@@ -114,8 +114,6 @@ def import_demonstrations(
     robot: RobotLimits | None = None,
     gate: GateSettings | None = None,
     take_guesses: bool = False,
-    declared: Callable[[PlanFormat], Symmetry | None] = lambda _: None,
-    before: Demonstrations | None = None,
     **options: Any,
 ) -> ImportResult:
     """Read, join with the outcomes, select joints, trim, resample, and preview.
@@ -135,8 +133,6 @@ def import_demonstrations(
         robot: Limits that every demonstration is checked against; None checks none.
         gate: The gate's settings for that check.
         take_guesses: Infer missing or implausible units, times and names instead of raising.
-        declared: Says how motions of a format may be moved, if they may.
-        before: Demonstrations beside which these are to be, in their turns, signs and units.
         options: Fields of `ReadOptions`.
 
     Raises:
@@ -148,13 +144,9 @@ def import_demonstrations(
     """
     called = None if names is None else tuple(names)
     form = called, plan_units, outcome_names, outcome_units
-    wanted = Wanted(*form, preprocessing, robot, gate, declared, before)
+    wanted = Wanted(*form, preprocessing, robot, gate)
     recordings = read(source, ReadOptions(**options))
-    selection = recordings.select(wanted)
-    asked = () if take_guesses else selection.ambiguities
-    known, more = recordings.outcomes(wanted, outcomes, outcome_unit, unclear=asked)
-    raise_if_ambiguous(selection.ambiguities + more, take_guesses=take_guesses)
-    return recordings.demonstrations(selection, known, wanted)
+    return recordings.imported(wanted, outcomes, outcome_unit, take_guesses=take_guesses)
 
 
 def inspect_recordings(
@@ -248,20 +240,35 @@ class Recordings:
         unclear = self.ambiguities + selection.ambiguities + unsaid
         return replace(selection, ambiguities=unclear, remarks=(*selection.remarks, *said))
 
-    def outcomes(
+    def imported(
         self,
         wanted: Wanted,
-        given: str | os.PathLike[str] | Mapping[str, Sequence[float]] | None = None,
+        given: GivenOutcomes = None,
         unit: str | None = None,
         *,
-        unclear: Sequence[Ambiguity] = (),
+        take_guesses: bool = False,
+    ) -> ImportResult:
+        """Make demonstrations of them, without a question; `import_demonstrations` says how."""
+        selection = self.select(wanted)
+        known, unclear = self.outcomes(selection, wanted, given, unit, take_guesses=take_guesses)
+        raise_if_ambiguous(unclear, take_guesses=take_guesses)
+        return self.demonstrations(selection, known, wanted)
+
+    def outcomes(
+        self,
+        selection: Selection,
+        wanted: Wanted,
+        given: GivenOutcomes = None,
+        unit: str | None = None,
+        *,
         may_lack: bool = False,
+        take_guesses: bool = False,
     ) -> tuple[Outcomes, tuple[Ambiguity, ...]]:
-        """Find outcomes in their wanted units, and what is only guessed of these.
+        """Find outcomes in their wanted units, and all that is only guessed, of the selection too.
 
         They are those `given` (a table, or numbers by episode in the wanted units), a table beside
-        the recordings, or the recordings' own. `unit` is of columns that name none, `unclear` what
-        else is to be said where there are none; with `may_lack`, none are returned then.
+        the recordings, or the recordings' own. `unit` is of columns that name none. Where there are
+        none, what is unclear of the selection is said too; with `may_lack`, none are returned then.
         ConfigurationError if the given outcomes are not numbers; InvalidDemonstrationsError if
         there are none, a component is missing, or a row is of no episode of the source
         (UnclearUnitsError if something is unclear); FileFormatError if the table is missing or
@@ -274,20 +281,21 @@ class Recordings:
         try:
             found = self._outcomes(given, wanted.outcome_names, may_lack=may_lack)
         except InvalidDemonstrationsError as missing:
-            raise_if_ambiguous(unclear, also=str(missing))
+            also = str(missing)
+            raise_if_ambiguous(selection.ambiguities, also, take_guesses=take_guesses)
             raise
         if isinstance(given, Mapping):
-            return found, ()
+            return found, selection.ambiguities
         found, doubts = beside_tables(found, own, others)
         chosen = [recording.episode for recording in self.episodes]
         if not missing_outcomes(chosen, found):  # rows of others may be anything
             found = found.of(chosen)
         found, more = in_units(found, wanted.outcome_units, unit)
-        return found, doubts + more
+        return found, selection.ambiguities + doubts + more
 
     def _outcomes(
         self,
-        given: str | os.PathLike[str] | Mapping[str, Sequence[float]] | None,
+        given: GivenOutcomes,
         names: Sequence[str] | None,
         *,
         may_lack: bool,

@@ -65,7 +65,9 @@ class Wanted:
     robot: RobotLimits | None = None
     gate: GateSettings | None = None
     declared: Callable[[PlanFormat], Symmetry | None] = lambda _: None
+    """How motions of a format may be moved, if they may."""
     before: Demonstrations | None = None
+    """Demonstrations beside which these are to be, in their turns, signs and units."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -314,13 +314,12 @@ class Workspace:
             InvalidDemonstrationsError, UnclearUnitsError, FileFormatError: As it says there.
             TrialStateError: A trial waits to be told.
         """
-        from prior_reinforce.arm.recordings import import_demonstrations
+        from prior_reinforce.arm.recordings import ReadOptions, read
 
         self.state.refuse_open_trial("importing demonstrations")
         wanted = self.wanted(preprocessing, append=append)
-        options = {"joints": wanted.names, "take_guesses": take_guesses, **options}
-        of_outcomes: Any = {"outcomes": outcomes, "outcome_unit": outcome_unit}
-        result = import_demonstrations(source, **of_outcomes, **options, **vars(wanted))
+        recordings = read(source, ReadOptions(**{"joints": wanted.names, **options}))
+        result = recordings.imported(wanted, outcomes, outcome_unit, take_guesses=take_guesses)
         self.take_in(result, str(source), append=append)
         return result
 
