@@ -32,15 +32,7 @@ from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.events import Amended, GoalSet, Told, Voided
 from prior_reinforce.session.in_use import InUse, check_parts, generated, latest_goal
-from prior_reinforce.session.trials import (
-    Goal,
-    Log,
-    SessionState,
-    Stage,
-    Trial,
-    Verdict,
-    told_of,
-)
+from prior_reinforce.session.trials import Goal, Log, SessionState, Stage, Trial, Verdict
 
 
 class Session:
@@ -155,7 +147,7 @@ class Session:
     @property
     def n_trials(self) -> int:
         """Trials told so far for the goal that is worked on; voided ones are not counted."""
-        return len(told_of(self.trials))
+        return sum(trial.stage is Stage.TOLD for trial in self.trials)
 
     def trial(self, number: int) -> Trial:
         """Return a trial of any goal as it stands.
