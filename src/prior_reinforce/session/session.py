@@ -227,7 +227,7 @@ class Session:
             TrialStateError: The open trial may not be given out again (`check_open`).
             WorkspaceError: No goal is set, or the log cannot be written.
         """
-        return _ask([self], may_repeat=False)[0]
+        return ask_all([self], may_repeat=False)[0]
 
     def tell(
         self, number: int, seen: Reading | ArrayLike | None = None, *, hit: bool | None = None
@@ -370,8 +370,9 @@ class Session:
         self, state: SessionState, parts: InUse, condition: Point, plan: Frames, may_repeat: bool
     ) -> Verdict | None:
         """Write a new trial down, if its plan may be executed."""
+        again = may_repeat and self._gate is None
         event, plan, verdict = parts.passing(
-            state, condition, plan, self._verdict, may_repeat=may_repeat
+            state, condition, plan, self._verdict, may_repeat=again
         )
         self.log.keep_adapter(parts.adapter)
         self.log.append_asked(event, plan, parts.demonstrations.format)
@@ -405,14 +406,12 @@ class Session:
         return verdict
 
 
-def ask_all(sessions: Sequence[Session]) -> list[Trial]:
+def ask_all(sessions: Sequence[Session], *, may_repeat: bool = True) -> list[Trial]:
     """Ask many sessions at once: one call of each generator for all that have no open trial.
-
-    Without a gate, a goal that plans do not reach is tried again all the same, unlike `ask`: one of
-    many does not end the others.
 
     Args:
         sessions: Different sessions; those that share a generator share its call.
+        may_repeat: Without a gate, try a goal again that plans do not reach, where `ask` raises.
 
     Returns:
         The open trial of each, in order.
@@ -420,10 +419,6 @@ def ask_all(sessions: Sequence[Session]) -> list[Trial]:
     Raises:
         ConfigurationError: A session stands there twice.
     """
-    return _ask(sessions, may_repeat=True)
-
-
-def _ask(sessions: Sequence[Session], *, may_repeat: bool) -> list[Trial]:
     if len({id(session) for session in sessions}) < len(sessions):
         raise ConfigurationError("sessions asked together must be different ones")
     for session in sessions:
@@ -448,8 +443,7 @@ def _ask(sessions: Sequence[Session], *, may_repeat: bool) -> list[Trial]:
             plans = generated([each.generator for each in parts], conditions)
             opened = zip(new.items(), parts, conditions, plans, strict=True)
             for (session, state), each, condition, plan in opened:
-                again = may_repeat and session._gate is None
-                verdicts[session] = session._open(state, each, condition, plan, again)
+                verdicts[session] = session._open(state, each, condition, plan, may_repeat)
     return [
         session._with_plan(state, number, verdicts)
         for session, (state, number) in zip(sessions, asked, strict=True)
