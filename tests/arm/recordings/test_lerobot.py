@@ -56,6 +56,12 @@ def test_lerobot_with_a_missing_episode(tmp_path):
     np.testing.assert_allclose(result.demonstrations.outcomes_seen[3], OUTCOMES["4"])
 
 
+def test_lerobot_without_a_list_of_episodes_is_read_by_its_frames(tmp_path):
+    folder = write_lerobot(tmp_path / "set", version="v2.1")
+    (folder / "meta" / "episodes.jsonl").unlink()
+    assert len(read_recordings(folder)) == N
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("version", ["v3.0", "v2.1"])
 def test_tasks_of_a_data_set_that_holds_several_are_told(tmp_path, version):

@@ -94,7 +94,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         clocks = {n: a.ravel() for n, a in arrays.items() if a.size == len(a) and n not in keys}
         clock = _clock(source, str(number), index, clocks, rate, options)
         arrays = {n: a for n, a in arrays.items() if n != _STAMPS or n in keys}
-        of_tasks = (f"its task is {tasks[number]!r}",) * (len({*tasks.values()}) > 1)
+        of_tasks = (f"its task is {tasks.get(number)!r}",) * (len({*tasks.values()}) > 1)
         why = (*remarks, *of_tasks)
         return recorded_among(
             source, str(number), keys, arrays, options, texts=said, clock=clock, remarks=why
