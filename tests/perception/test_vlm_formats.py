@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+import json
+from contextlib import nullcontext, suppress
 
 import pytest
 from hypothesis import given, settings
@@ -199,3 +200,142 @@ def test_the_prompt_names_the_object_once_asked():
 )
 def test_a_key_says_which_side_a_number_is(family, answer):
     assert read_box(answer, FORMATS[family], (1000, 1000)) == EXPECTED
+
+
+BALL = "the orange ball"
+HERE, THERE = [412, 300, 450, 340], [600, 300, 660, 360]
+
+
+def seen_at(answer, family="qwen3-vl", words=BALL):
+    return [*read_box(answer, FORMATS[family], (1000, 1000), words)]
+
+
+def labelled(box=HERE, label=BALL, **more):
+    return json.dumps({"bbox_2d": box, "label": label, **more}, ensure_ascii=False)
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        f"The orange ball is not in the image. There is only a yellow ball at {HERE}.",
+        f"There is no orange ball, but a lemon at <|begin_of_box|>[{HERE}]<|end_of_box|>.",
+        f"I cannot see an orange ball. The closest match is the hoop: [{HERE}]",
+        f"I'm unable to find it. A similar object: ```json\n[{labelled()}]\n```",
+        f"图中没有橙色的球，只有一个红色的圆环：{HERE}",
+        f"[]. The closest object is at {HERE}.",
+        f"The orange ball is at {HERE}. It is a lemon, not the orange ball.",
+        f"{HERE}. This is not the object you asked for.",
+        f"{HERE}, not to be confused with the orange ball.",
+        f"{HERE}. There is no ball other than this yellow one.",
+        labelled(label="a lemon, not the orange ball"),
+        labelled(label="the orange ball (not visible)"),
+        labelled(present=False),
+        labelled(confidence=0.02),
+        labelled(confidence="low"),
+        labelled(reasoning="There is no orange ball, so this is the lemon."),
+        json.dumps({"found": False, "box": {"x1": 412, "y1": 300, "x2": 450, "y2": 340}}),
+    ],
+)
+def test_a_box_that_its_answer_denies_is_none(answer):
+    with pytest.raises(UnreadableAnswerError):
+        seen_at(answer)
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        f"1. Orange ball: {HERE}\n2. Orange ball: {THERE}",
+        f"{labelled()}\n{labelled(THERE)}",
+        f"```json\n[{labelled()}]\n```\nand\n```json\n[{labelled(THERE)}]\n```",
+        f"<|begin_of_box|>[{HERE}]<|end_of_box|> and <|begin_of_box|>[{THERE}]<|end_of_box|>",
+        f"The orange ball could be {HERE} or {THERE}.",
+        f"{HERE}; a second orange ball is at {THERE}",
+        f"The ball is at {HERE}. The hoop is at {THERE}.",
+        f"The ball is at {HERE}. Finally, the hoop is at {THERE}.",
+        f"The ball is at {HERE}. Actually, there is also one at {THERE}.",
+        f"{labelled()} {THERE}",
+        f"{HERE} in an image of [0, 0, 1000, 1000]",
+        "(431, 320), (412, 300), (450, 340)",
+        "[0.98, 412, 300, 450, 340]",
+    ],
+)
+def test_several_boxes_are_none_wherever_they_stand(answer):
+    with pytest.raises(UnreadableAnswerError, match=r"\d boxes"):
+        seen_at(answer)
+
+
+@pytest.mark.parametrize(
+    ("label", "words", "is_read"),
+    [
+        ("the red hoop", BALL, False),
+        ("not found", BALL, False),
+        ("none", BALL, False),
+        ("yellow ball", BALL, False),
+        ("orange cup", BALL, False),
+        ("cup 1", "the cup 2", False),
+        ("红色的圆环", "橙色的球", False),
+        ("橙色球", "橙色的球", True),
+        ("Orange balls", BALL, True),
+        ("ball", BALL, True),
+        ("small orange ball", BALL, True),
+        ("the orange ball, not the hoop", BALL, True),
+        ("target object", BALL, True),
+        ("the ball with no stripes", "the ball with no stripes", True),
+    ],
+)
+def test_a_box_is_of_what_its_label_says(label, words, is_read):
+    for answer in (
+        labelled(label=label),
+        f"<ref>{label}</ref><box>[{HERE}]</box>",
+        labelled(label=label).replace(str(HERE), '{"x1": 412, "y1": 300, "x2": 450, "y2": 340}'),
+    ):
+        with nullcontext() if is_read else pytest.raises(UnreadableAnswerError, match="labelled"):
+            assert seen_at(answer, words=words) == HERE
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        f"[{labelled()}, {labelled(THERE, 'the red hoop')}]",
+        f"{labelled(THERE, 'the red hoop')}\n{labelled()}",
+        f"```json\n{labelled()}\n```\n```json\n{labelled(THERE, 'the red hoop')}\n```",
+        f"<ref>the orange ball</ref><box>[{HERE}]</box><ref>the hoop</ref><box>[{THERE}]</box>",
+        f"{THERE}. Correction: {HERE}",
+        f"The ball is at {THERE}. Wait, that is wrong. It is at {HERE}.",
+        f"I first thought of {THERE}, but that is not orange. **Final answer:** {HERE}",
+        f"The object at {THERE} is the red hoop. Therefore, the answer is {HERE}",
+        f"First, {THERE}, which is red. Second, {HERE}, which is orange. Final answer: {HERE}",
+        f"<analysis>maybe {THERE}</analysis> {HERE}",
+        f"It is at {HERE}: {labelled()}",
+    ],
+)
+def test_of_several_boxes_the_one_that_is_meant_is_read(answer):
+    assert seen_at(answer) == HERE
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        labelled(attributes=[]),
+        labelled(occluded=False, truncation="none", confidence=0.97),
+        f"{HERE}. Other objects: []",
+        json.dumps({"objects": [{"bbox_2d": HERE}], "warnings": []}),
+        f"{HERE}. There are no other balls in the image.",
+        f"{HERE}. I do not see any other ball.",
+        f"{HERE}, not to be confused with the hoop.",
+        f"橙色的球：{HERE}。没有其他球。",
+        str(HERE).replace(", ", "，"),
+        "［４１２，３００，４５０，３４０］",
+        '["412", "300", "450", "340"]',
+        '{"x1": "412", "y1": "300", "x2": "450", "y2": "340"}',
+        "[412px, 300px, 450px, 340 px]",
+        "<box>412 300 450 340</box>",
+        '{"x": 412, "y": 300, "width": 38, "height": 40}',
+        '{"left": 412, "top": 300, "width": 38, "height": 40}',
+        '{"top_left": [412, 300], "bottom_right": [450, 340]}',
+        '{"top_left": {"x": 412, "y": 300}, "bottom_right": {"x": 450, "y": 340}}',
+        "[412, 300, 450, 340, 0.98]",
+    ],
+)
+def test_a_clear_answer_is_read_in_whatever_form(answer):
+    assert seen_at(answer) == HERE

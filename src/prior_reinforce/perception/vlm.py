@@ -317,7 +317,9 @@ class VisionLanguageModel(Perception):
                     "the answer is empty, all of it is in the thoughts; serve the model without a "
                     "reasoning parser, or raise max_tokens"
                 )
-            box = vlm_formats.read_box(answer.text, FORMATS[self.config.family], (width, height))
+            box = vlm_formats.read_box(
+                answer.text, FORMATS[self.config.family], (width, height), wanted.words
+            )
             per_x, per_y = picture.shape[1] / width, picture.shape[0] / height
             left, top, right, bottom = np.multiply(box, (per_x, per_y, per_x, per_y)).tolist()
             here = self._in(picture)

@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from dataclasses import dataclass, replace
-from itertools import accumulate
 from typing import Literal
 
 from prior_reinforce.errors import PerceptionFailedError
@@ -90,37 +90,47 @@ def size_to_send(width: int, height: int, most_side: int, box_format: BoxFormat)
     return max(1, int(width * shrink / step)) * step, max(1, int(height * shrink / step)) * step
 
 
-def read_box(answer: str, box_format: BoxFormat, size: tuple[int, int]) -> Box:
-    """Read the one box of an answer, in pixels of the picture of `size` that was sent.
+def read_box(answer: str, box_format: BoxFormat, size: tuple[int, int], words: str = "") -> Box:
+    """Read where an answer says the object is, in pixels of the picture of `size` that was sent.
 
-    Thinking text is skipped; of several boxes the last marked one counts, else the last one in the
-    text, as models restate and correct themselves. Swapped corners are put right. NotInPictureError
-    if the answer is an empty list; UnreadableAnswerError for no box, several at once, or one that
-    cannot be in the picture.
+    Thinking text is skipped, and where boxes are marked only they count. A box that is restated or
+    corrected gives way to the later one, and one that is labelled as something else than the
+    `words` asked for to one that is not. Swapped corners are put right. NotInPictureError if the
+    answer is an empty list; UnreadableAnswerError for no box, several, one that the answer itself
+    denies, or one that cannot be in the picture.
     """
     thoughts = [*_THOUGHTS.finditer(answer)]
     if thoughts and not thoughts[-1]["ends"]:
         raise UnreadableAnswerError("the answer ends while the model is still thinking")
-    said = " ".join(answer[thoughts[-1].end() if thoughts else 0 :].split())
+    said = unicodedata.normalize("NFKC", answer[thoughts[-1].end() if thoughts else 0 :])
+    said = " ".join(said.split())
     if len(said) > _LONGEST:
         raise UnreadableAnswerError(f"an answer of {len(said)} characters to a plain question")
-    said = _OBJECT.sub(_as_list, said)
-    marked = _MARKED.findall(said)
-    boxes = _last_boxes(marked[-1] if marked else said)
-    if boxes is None and marked:
-        boxes = _last_boxes(said)
-    if boxes is None:
+    statements, behind = _statements(said)
+    if not statements:
         shown = said if len(said) <= 80 else said[:77] + "..."
         raise UnreadableAnswerError(f"no box in the answer {shown!r}")
-    if not boxes:
+    if not statements[-1].boxes:
         raise NotInPictureError("the model says that it is not in the picture")
+    own = [each for each in statements if _may_be(each.label, words)]
+    if not own:
+        label = statements[-1].label
+        raise UnreadableAnswerError(
+            f"the box is labelled {label!r}; if that is right, ask for it so"
+        )
+    if not all(each.boxes for each in own):
+        raise UnreadableAnswerError("both an empty list and a box for one object")
+    boxes: dict[tuple[float, ...], str] = {}
+    for key, numbers in (box for each in own for box in each.boxes):
+        boxes[numbers] = key or boxes.get(numbers, "")
     if len(boxes) > 1:
         raise UnreadableAnswerError(f"{len(boxes)} boxes for one object")
-    *_, last = _BOX_OR_EMPTY.finditer(said)
-    behind = _QUOTED.sub("", said[last.end() :])
-    if _TAKEN_BACK.search(behind):
-        raise UnreadableAnswerError(f"behind its box the answer says {behind[:80].strip()!r}")
-    key, *numbers = boxes[0]
+    around = "".join(s.before + s.held * (s in own) for s in statements) + behind
+    denial = _FLAG.search(around) or _DENIED.search(_about(around, words))
+    if denial := denial or _TAKEN_BACK.search(behind):
+        shown = denial.string[denial.start() :][:80].strip()
+        raise UnreadableAnswerError(f"of its box the answer says {shown!r}")
+    ((numbers, key),) = boxes.items()
     if key == "box_2d":
         box_format = FORMATS["gemini"]
     elif key:
@@ -128,74 +138,169 @@ def read_box(answer: str, box_format: BoxFormat, size: tuple[int, int]) -> Box:
     return _in_pixels(numbers, box_format, size)
 
 
+@dataclass(frozen=True)
+class _Statement:
+    """What an answer says of one place."""
+
+    before: str
+    """The words since the last place."""
+    held: str
+    """The JSON object, or the list, that holds the boxes."""
+
+    @property
+    def label(self) -> str:
+        """What is said to be there; empty where nothing is."""
+        labels = _LABEL.findall(self.held)[:1] or _LABEL.findall(self.before)[-1:]
+        return "".join(labels[0]) if labels else ""
+
+    @property
+    def boxes(self) -> list[tuple[str, tuple[float, ...]]]:
+        """Each box with its key, empty where there is none; none for an empty list."""
+        boxes = []
+        for run in _RUN.finditer(self.held):
+            numbers = [float(number) for number in re.findall(_NUMBER, run[2])]
+            if len(numbers) % 4 == 1 and 0 <= numbers[-1] <= 1:
+                numbers.pop()  # a score
+            boxes += [(run[1] or "", (*numbers[i : i + 4],)) for i in range(0, len(numbers), 4)]
+        return boxes
+
+
 _LONGEST = 20_000
 """Characters of an answer that is read, without its thinking; ours: a box takes fifty."""
 # Every part has a limit, so that no answer takes long to search; white space is single by then.
-_NUMBER = r"(-?(?<![\d.])\d{1,9}(?:\.\d{1,20})?(?![\d]))"
-_BETWEEN = r" ?[\])>]? ?, ?[\[(<]? ?"  # "(x1, y1), (x2, y2)" counts as one box
+_NUMBER = r"[\"']?(-?(?<![\d.])\d{1,9}(?:\.\d{1,20})?(?![\d%]))(?: ?px)?[\"']?"
+_BETWEEN = r"(?: ?[\])>]? ?[,;] ?[\[(<]? ?| )"  # "(x1, y1), (x2, y2)" counts as one box
 _KEY = r"(?:[\"'](box_2d|bbox_2d|sides)[\"'] ?: ?[\[( ]{0,4})?"
-_BOX_OR_EMPTY = re.compile(_KEY + _BETWEEN.join([_NUMBER] * 4) + r"|\[[ \[\]]{0,40}\]")
-_OBJECT = re.compile(r"\{[^{}]{0,400}\}")
+_RUN = re.compile(_KEY + rf"({_NUMBER}(?:{_BETWEEN}{_NUMBER}){{3,}})")
+_OBJECT = re.compile(r"(?P<inner>[\"'] ?: ?)?\{(?P<body>[^{}]*)(?:\}|$)")
+_EMPTY = r"\[[ \[\]]{0,40}\]"
+_PLACE = re.compile(
+    r"<\|(?P<mark>[a-z_]+)\|>"
+    rf"|(?P<aside>(?:\bothers?\b[^.\[\]]{{0,40}}|[\"']\w{{1,20}}[\"'] ?: ?){_EMPTY})"
+    rf"|(?P<held>\{{[^{{}}]*(?:\}}|$)|{_RUN.pattern}|{_EMPTY})",
+    re.IGNORECASE,
+)
+"""Boxes, or an empty list for none; one of other objects or of something else is an aside."""
 _SIDE = re.compile(rf"[\"'](\w{{1,8}})[\"'] ?: ?{_NUMBER}")
 _SIDES = (
     ("x1", "y1", "x2", "y2"),
     ("xmin", "ymin", "xmax", "ymax"),
     ("x_min", "y_min", "x_max", "y_max"),
     ("left", "top", "right", "bottom"),
+    ("left", "top", "width", "height"),
+    ("x", "y", "width", "height"),
+    ("x", "y", "w", "h"),
 )
 """Keys of a box whose numbers stand each under one of its own."""
-_MARKED = re.compile(
-    r"<\|(?:begin_of_box|box_start)\|>(.*?)(?:<\|(?:end_of_box|box_end)\|>|\Z)", re.DOTALL
+_CORNERS = re.compile(
+    rf"[\"']top_left[\"'] ?: ?([\[(] ?{_NUMBER} ?, ?{_NUMBER} ?[\])]) ?, ?"
+    rf"[\"']bottom_right[\"'] ?: ?([\[(] ?{_NUMBER} ?, ?{_NUMBER} ?[\])])"
+)
+_LABEL = re.compile(
+    r"[\"'](?:object_|class_)?(?:label|name|object|class|category)[\"'] ?: ?"
+    r"(?:\"([^\"]{0,200})\"|'([^']{0,200})')"
+    r"|<ref>(.{0,200}?)</ref>|<\|object_ref_start\|>(.{0,200}?)<\|object_ref_end\|>"
 )
 _THOUGHTS = re.compile(
-    r"[<\[◁](?P<ends>/?)(?:\w{1,9}:)?(?:think|thinking|thought|reasoning)[>\]▷]", re.IGNORECASE
-)
-"""Begin and end of thinking text: `<think>`, `[/THINK]`, `◁/think▷`, `</seed:think>`."""
-_QUOTED = re.compile(r"\"[^\"]*\"")
-_TAKEN_BACK = re.compile(
-    r"\b(?:no|not|never|none|cannot|but|however|wait|sorry|wrong|mistake)\b|n['’]t\b|[不没]",
+    r"[<\[◁](?P<ends>/?)(?:\w{1,9}:)?(?:think|thinking|thought|reasoning|analysis)[>\]▷]",
     re.IGNORECASE,
 )
-"""Words behind a box of an answer that does not stand by it; ours: models that do say little."""
-_SEPARATORS = re.compile(r"[\s,;\[\](){}<>]*")
-_MARKER = re.compile(r"<\|[a-z_]+\|>")
+"""Begin and end of thinking text: `<think>`, `[/THINK]`, `◁/think▷`, `</seed:think>`."""
+_RESTATED = re.compile(
+    r"\b(?:again|second thought|correct(?:ion|ed|ing)|actually|wait|sorry|wrong|final\b|therefore"
+    r"|thus|closer look|(?:re-?|double-)check|refin|revis|adjust|updat|more precise"
+    r"|answer\W{0,3}(?:is\b|:))|更正|修正|最终",
+    re.IGNORECASE,
+)
+"""Words between two boxes of which the later one replaces the earlier; these words are ours."""
+_FURTHER = re.compile(r"\b(?:or|also|another|others?|a second|two|both)\b", re.IGNORECASE)
+"""Words between two boxes that are both meant."""
+_DENIED = re.compile(
+    r"\b(?:no|not|never|none|nothing|neither|cannot|unable|absent|missing|instead)\b"
+    r"|\w{1,9}n['’]t\b|[不没未无]",
+    re.IGNORECASE,
+)
+_OF_OTHERS = re.compile(
+    r"(?:\bno|\bnot|n['’]t)(?: (?:see|find|have|any))* (?:others?|problem|doubt)\b|没有其[他它]"
+    r"|\bnot (?:to be \w{1,9} (?:with|for) )?(?:the|an?) "
+    r"(?!(?:object|target|thing|one|right|correct)\b)(?P<thing>[^.,;:]{1,80})",
+    re.IGNORECASE,
+)
+"""Denials that are of other objects, unless the thing is the one that was asked for."""
+_FLAG = re.compile(
+    r"[\"'](?:is_)?(?:present|found|visible|exists?|detected|confidence|score)[\"'] ?: ?"
+    r"[\"']?(?:false|no|low|0?\.[0-4]\d{0,20}|0(?:\.0{1,20})?)(?![\w.])",
+    re.IGNORECASE,
+)
+"""A flag that the object is not there, or a confidence below one half."""
+_TAKEN_BACK = re.compile(r"\b(?:but|however|wait|sorry|wrong|mistake)\b", re.IGNORECASE)
+"""Words behind a box of an answer that does not stand by it: models that do say little."""
+_ONE_WORD = re.compile(r"\"[^\"\s]*\"")
+_NAME = re.compile(r"[一-鿿]|[^\W_一-鿿]+")
+_NAMELESS = {"the", "a", "an", "it", "object", "target", "thing"}
 
 
-def _as_list(found: re.Match[str]) -> str:
-    """An object with a number for each side as a list of them; any other as it is."""
-    said = dict(_SIDE.findall(found[0]))
-    for keys in _SIDES:
-        if all(key in said for key in keys):
-            return f'"sides": [{", ".join(said[key] for key in keys)}]'
-    return found[0]
+def _statements(said: str) -> tuple[list[_Statement], str]:
+    """Split an answer into what it says of each place and the words behind the last one.
 
-
-def _last_boxes(said: str) -> list[tuple[str, float, float, float, float]] | None:
-    """Return the different boxes of the last list in a text; [] for an empty list, None for none.
-
-    Each has its key before it, empty where there is none.
-
-    Boxes belong to one list if they share an outer bracket, or follow each other with nothing but
-    separators between them.
+    What it replaces by a later statement is left out.
     """
-    text = " ".join(_MARKER.sub(" ", said).split())
-    depths = list(accumulate((c in "[({") - (c in "])}") for c in text))
-    last: list[tuple[str, float, float, float, float]] | None = None
+    for _ in range(3):  # as deep as one object is within another
+        said = _OBJECT.sub(_opened, _CORNERS.sub(r'"sides": [\1, \4]', said))
+    found, is_marked = [], False
+    for place in _PLACE.finditer(said):
+        if place["mark"]:
+            is_marked = place["mark"] in ("begin_of_box", "box_start")
+        elif place[0][0] != "{" or _RUN.search(place[0]):
+            found.append((place, is_marked))
+    marked = [place for place, is_marked in found if is_marked]
+    places = marked or [place for place, _ in found if place["held"]] or [p for p, _ in found]
+    statements: list[_Statement] = []
     end = 0
-    for found in _BOX_OR_EMPTY.finditer(text):
-        start, is_box = found.start(), found[2] is not None
-        follows = _SEPARATORS.fullmatch(text, end, start) or min(depths[end:start]) > 0
-        if last is None or not follows or not is_box:
-            last = []
-        if is_box:
-            key, *sides = found.groups()
-            one, two, three, four = map(float, sides)
-            last += [box for box in [(key or "", one, two, three, four)] if box not in last]
-        end = found.end()
-    return last
+    for place in places:
+        before, end = said[end : place.start()], place.end()
+        again = [*_RESTATED.finditer(before)]
+        if statements and again and not _FURTHER.search(before):
+            statements, before = [], before[again[-1].start() :]
+        statements.append(_Statement(before, place[0]))
+    return statements, said[end:]
 
 
-def _in_pixels(numbers: list[float], box_format: BoxFormat, size: tuple[int, int]) -> Box:
+def _opened(found: re.Match[str]) -> str:
+    """A JSON object with its numbers in a list; without braces if it is a value or has no box."""
+    inner, body = found["inner"] or "", found["body"]
+    said = dict(_SIDE.findall(body))
+    for keys in _SIDES:
+        if all(key in said for key in keys) and "sides" not in body:
+            numbers = [float(said[key]) for key in keys]
+            if keys[-1][0] == "h":
+                numbers[2:] = numbers[0] + numbers[2], numbers[1] + numbers[3]
+            body = f'"sides": {numbers}, {body}'
+    if inner and {"x", "y"} == said.keys():
+        body = f"[{said['x']}, {said['y']}]"
+    return inner + body if inner or not _RUN.search(body) else f"{{{body}}}"
+
+
+def _names(text: str) -> set[str]:
+    """Words that can tell objects apart, without the plural's s."""
+    return {name.rstrip("s") for name in _NAME.findall(text.lower())} - _NAMELESS
+
+
+def _about(text: str, words: str) -> str:
+    """A text with what it denies of others left out, and `it` for the object's words."""
+    if words:
+        text = re.sub(re.escape(words), "it", text, flags=re.IGNORECASE)
+    asked, text = _names(words), _ONE_WORD.sub('""', text)
+    return _OF_OTHERS.sub(lambda of: of[0] if _names(of["thing"] or "") & asked else "", text)
+
+
+def _may_be(label: str, words: str) -> bool:
+    """Whether a label is of what was asked for: of less or more words than that, or of none."""
+    asked, named = _names(words), _names(_OF_OTHERS.sub("", label))
+    return not asked or len(label) < 2 or named <= asked or asked <= named
+
+
+def _in_pixels(numbers: tuple[float, ...], box_format: BoxFormat, size: tuple[int, int]) -> Box:
     most_x, most_y = (1000, 1000) if box_format.scale == "thousandths" else size
     (left, right), (top, bottom) = sorted(numbers[::2]), sorted(numbers[1::2])
     if box_format.y_first:
