@@ -305,6 +305,21 @@ def test_boxes_with_x_and_y_swapped_give_no_number_and_name_the_families(
     assert reading.problem.rstrip(")").endswith(f"set family to {remedy}")
 
 
+@pytest.mark.parametrize("size", [(640, 480), (1280, 960)])
+@pytest.mark.parametrize("loose", [*LOOSE[:2], ((0.95, 1.05), (1.05, 0.95))])
+def test_swapped_boxes_are_told_in_a_picture_of_4_to_3_too(
+    size, loose, table_model, frame_with_ball_at
+):
+    with_camera = Camera(CameraConfig(width=size[0], height=size[1]))
+    calibration = with_camera.calibrate(table_model, np.array(SCENE.marks), height=RIM_HEIGHT)
+    picture = with_camera.picture(frame_with_ball_at(*BALL), GOAL)
+    with_camera.close()
+    client, how = Says(swaps=True, loose=loose), VisionLanguageModelConfig()
+    with VisionLanguageModel(SCENE, how, client=client, calibration=calibration) as perception:
+        problem = perception.read(picture).problem
+    assert "only with x and y swapped" in problem
+
+
 def test_the_family_that_is_named_for_swapped_boxes_reads_them(wide):
     picture, calibration = wide
     how = VisionLanguageModelConfig(family="gemini")

@@ -194,7 +194,10 @@ class VisionLanguageModel(Perception):
             return "the model gives one box for both objects"
         read = [_misfit(box, calibration, size) for box, size in found]
         swapped = [_misfit(self._swapped(box, wide / tall), calibration, s) for box, s in found]
-        if _fits_better(swapped, read):
+        # Swapped thousandths fit by the picture's shape worse, as two loose boxes hardly both do.
+        in_pixels = FORMATS[self.config.family].scale == "pixels"
+        flat = 1.0 if in_pixels else max(wide / tall, tall / wide)
+        if _fits_better(swapped, read, min(_LOOSE, flat**0.5) if flat > _LOOSE else _LOOSE):
             return f"both boxes fit {self._other_order()}"
         exchanged = [_misfit(reached.box, calibration, other), _misfit(goal.box, calibration, one)]
         if _fits_better(exchanged, read):
@@ -413,12 +416,12 @@ def _step(picture: Picture) -> float:
     return max(1.0, max(picture.shape) / 1000)
 
 
-def _fits_better(swapped: list[float], read: list[float]) -> bool:
-    """Whether boxes fit swapped or exchanged, each better by more than boxes are drawn loosely.
+def _fits_better(swapped: list[float], read: list[float], by: float = _LOOSE) -> bool:
+    """Whether boxes fit swapped or exchanged, each better by more than a factor.
 
-    Both are misfits.
+    Both are misfits; the factor is that by which boxes are drawn loosely, if nothing more is known.
     """
-    better = all(s * _LOOSE < r for s, r in zip(swapped, read, strict=True))
+    better = all(s * by < r for s, r in zip(swapped, read, strict=True))
     return max(swapped) <= _LOOSE and better
 
 
