@@ -324,6 +324,9 @@ def refused(address, **settings):
         (b"400 Bad", "Unsupported value: 'temperature' is 1 alone", "leave_out = ['temperature']"),
         (b"422 Bad", "chat_template_kwargs: extra fields", "leave_out = ['chat_template_kwargs']"),
         (b"500 Oh", "CUDA out of memory", "server's log"),
+        (b"402 Pay", "Insufficient credits", "credit"),
+        (b"503 No", "Loading model", "wait a minute"),
+        (b"400 Bad", "This model's maximum context length is 4096 tokens", "longer context"),
     ],
 )
 @pytest.mark.parametrize("form", ["error", "list", "bare", "detail", "text"])
@@ -352,6 +355,45 @@ def test_a_server_that_asks_for_an_hour_is_told_with_the_hour_and_the_requests_t
     assert "3600 s" in said
 
 
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        ("19.5", "wait 20 s"),
+        ("Wed, 21 Oct 2026 07:28:00 GMT", "until 21 October 07:28"),
+        ("soon", "wait a minute"),
+        ("nan", "wait a minute"),
+        ("inf", "wait a minute"),
+    ],
+)
+def test_how_long_a_server_asks_to_wait_is_told(asked, told):
+    content = body({"error": {"message": "slow down"}}, Retry_After=asked)
+    with endpoint(lambda file: file.write(content.replace(b"200 OK", b"429 No"))) as (address, _):
+        assert told in refused(address)
+
+
+def test_a_refusal_is_cut_between_words():
+    words = "max_tokens is too large: " + "2048 > 4096 - 3000 and so on " * 30
+    content = body({"error": {"message": words}}).replace(b"200 OK", b"400 Bad")
+    with endpoint(lambda file: file.write(content)) as (address, _):
+        shown = refused(address).partition(": max_")[2].partition(" ...;")[0]
+    assert 200 < len(shown) < 300
+    assert words.startswith(f"max_{shown} ")
+
+
+def test_a_completion_behind_a_byte_order_mark_is_read():
+    content = body(b"\xef\xbb\xbf" + json.dumps(COMPLETION).encode())
+    with endpoint(lambda file: file.write(content)) as (address, _):
+        assert ask(address).text == "[[1, 2, 3, 4]]"
+
+
+def test_an_answer_of_another_protocol_is_no_refusal():
+    native = {"model": "m", "message": {"role": "assistant", "content": "[1]"}, "done": True}
+    with endpoint(lambda file: file.write(body(native))) as (address, _):
+        said = refused(address)
+    assert "refuses" not in said
+    assert "/v1" in said.rpartition(";")[2]
+
+
 def test_a_family_that_is_unknown_in_a_file_is_told_with_those_that_are_known(tmp_path):
     path = vlm_file(tmp_path, "http://127.0.0.1:8000/v1", family="llava")
     with pytest.raises(ConfigurationError, match=r"'llava'.*use one of glm-4\.5v, qwen2-vl, "):
@@ -371,6 +413,7 @@ def test_a_family_that_is_unknown_in_a_file_is_told_with_those_that_are_known(tm
         ),
         ("/api/v1/chat/completions", "/api/v1/chat", "/api/v1"),
         ("https://me:secret-7@gpu.example/v2/chat/completions", "https://gpu", "gpu.example/v2"),
+        ("/login?next=x", "/login", "set api_key_variable"),
     ],
 )
 def test_a_redirection_says_where_it_leads(location, leads, remedy):
@@ -423,6 +466,10 @@ def test_fields_that_a_server_refuses_are_left_out():
     [
         ({"content": [{"type": "text", "text": "[[1,"}, {"text": " 2]]"}]}, "[[1, 2]]", None),
         ({"content": [{"type": "image"}]}, "", None),
+        ({"content": [{"type": "output_text", "text": "[1]"}]}, "[1]", None),
+        ({"tool_calls": [{"function": {"name": "f", "arguments": "{[1, 2]}"}}]}, "{[1, 2]}", None),
+        ({"content": "", "tool_calls": [{"function": {"arguments": {"a": 1}}}]}, "{'a': 1}", None),
+        ({"content": "[1]", "tool_calls": []}, "[1]", None),
         ({"content": [{"type": "reasoning", "text": "[1]"}, {"text": "no"}]}, "no", None),
         ({"content": None, "reasoning": "so"}, "", "so"),
         ({"content": "a", "reasoning_content": "so"}, "a", "so"),

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import base64
+import codecs
 import io
+import math
 import os
 import ssl
 from contextlib import suppress
 from dataclasses import dataclass
+from email.utils import parsedate_to_datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol, get_args
 from urllib.parse import urljoin, urlsplit
@@ -24,7 +27,7 @@ from prior_reinforce.registry import build
 from prior_reinforce.settings import Checked, Count, NonNegative, Positive, tomllib
 
 _NO_KEY = "EMPTY"
-_MOST_SHOWN = 160
+_MOST_SHOWN = 300
 """Characters of a server's own words in a message."""
 _MOST_BYTES, _BYTES_A_TOKEN = 65_536, 100
 """Of an answer; ours: ten times what any tokenizer makes of a token, in JSON's escapes."""
@@ -119,9 +122,19 @@ class _Part(msgspec.Struct):
     type: str = "text"
 
 
+class _Function(msgspec.Struct):
+    arguments: Any = ""
+
+
+class _Call(msgspec.Struct):
+    function: _Function | None = None
+
+
 class _Message(msgspec.Struct):
     content: str | list[_Part] | None = None
     refusal: str | None = None
+    tool_calls: list[_Call] | None = None
+    """Of a tool that nobody offered: some models say a box so."""
     reasoning_content: str | None = None
     reasoning: str | None = None
     """The same, as vLLM calls it since 0.16."""
@@ -129,10 +142,13 @@ class _Message(msgspec.Struct):
     @property
     def text(self) -> str:
         """What is said, or why nothing is; parts of another type, as `reasoning`, are no text."""
-        said = self.content or self.refusal or ""
+        said = self.content or self.refusal
+        if not said:
+            called = [call.function for call in self.tool_calls or () if call.function]
+            said = "\n".join(str(function.arguments) for function in called)
         if isinstance(said, str):
             return said
-        return "".join(part.text or "" for part in said if part.type == "text")
+        return "".join(part.text or "" for part in said if part.type in ("text", "output_text"))
 
 
 class _Choice(msgspec.Struct):
@@ -247,7 +263,7 @@ class OpenAIClient:
                 messages=[{"role": "user", "content": asked}],
                 extra_body={k: v for k, v in more.items() if k not in self.config.leave_out},
             )
-            content = response.content
+            content = response.content.removeprefix(codecs.BOM_UTF8)
             choice = msgspec.json.decode(content, type=_Completion).choices[0]
         # Whatever a server sends, the client's parsing included, is no reason to break off.
         except Exception as error:
@@ -311,11 +327,18 @@ class OpenAIClient:
                 "OpenAI-compatible endpoint mostly ends in /v1"
             )
         what, remedy = f"failed with HTTP {error.status_code}", "see the server's log"
+        wait = _wait(error.response.headers.get("Retry-After", ""))
         if error.status_code == 429:
             what = f"refuses more requests for now (HTTP 429) {tries}"
-            wait = error.response.headers.get("Retry-After", "")
-            asked = f"{wait} s, as it asks" if wait.isdecimal() else "a minute"
-            remedy = f"wait {asked}, or see to the account's quota"
+            remedy = f"wait {wait}, or see to the account's quota"
+        elif error.status_code == 402:
+            what = "wants to be paid (HTTP 402)"
+            remedy = "top up the account's credit, or see the account's log"
+        elif error.status_code == 503:
+            what = f"is not ready (HTTP 503) {tries}"
+            remedy = f"wait {wait}, until the model is loaded or fewer ask it"
+        elif error.status_code == 400 and "context" in said.lower():
+            remedy = "lower max_tokens or max_image_side, or serve the model with a longer context"
         elif error.status_code == 401 or (error.status_code == 400 and "api key" in said.lower()):
             what, remedy = f"refuses the key (HTTP {error.status_code})", "set api_key_variable"
         elif error.status_code == 403:
@@ -331,7 +354,12 @@ class OpenAIClient:
             remedy = f"give it in {' or '.join(_proxies())}, as http://NAME:PASSWORD@proxy:3128"
         elif to := self._hidden(_redirected(error.response.headers.get("Location", ""), url)):
             what = f"sends the request on to {to} (HTTP {error.status_code})"
-            if (base := to.rstrip("/").removesuffix("/chat/completions")) != url.rstrip("/"):
+            base, path, _ = to.partition("/chat/completions")
+            if not path:
+                remedy = (
+                    "that is no endpoint: set api_key_variable, or base_url to the API's address"
+                )
+            elif base != url.rstrip("/"):
                 remedy = f"set base_url to {base}"
         elif fields := [field for field in get_args(_Field) if field in said]:
             remedy = f"where a field is not supported, set leave_out = {fields}"
@@ -347,13 +375,16 @@ class OpenAIClient:
         named = body.get("error") or body if isinstance(body, dict) else body
         if isinstance(named, dict):
             named = named.get("message") or named.get("detail")
+            named = None if isinstance(named, dict) else named  # a message of a chat is no error
         if isinstance(body, dict):
             words = named or words
         elif response is not None:
             words = response.text or words
         # The key is hidden before anything is cut: the rest of it would be no longer found.
         said = " ".join(self._hidden(str(words) or type(words).__name__).split())
-        return said[:_MOST_SHOWN], isinstance(body, dict) and bool(named)
+        if len(said) > _MOST_SHOWN:  # not within a number
+            said = f"{said[:_MOST_SHOWN].rpartition(' ')[0] or said[:_MOST_SHOWN]} ..."
+        return said, isinstance(body, dict) and bool(named)
 
 
 def _redirected(location: str, url: str) -> str:
@@ -362,6 +393,15 @@ def _redirected(location: str, url: str) -> str:
         to = without_secrets(urljoin(f"{url.rstrip('/')}/chat/completions", location))
         return to[:_MOST_SHOWN] if location else ""
     return ""
+
+
+def _wait(asked: str) -> str:
+    """How long a server asks to wait, in seconds or by a date; a minute if it asks for nothing."""
+    with suppress(ValueError, OverflowError):
+        return f"{max(1, math.ceil(float(asked)))} s, as it asks"
+    with suppress(ValueError):
+        return f"until {parsedate_to_datetime(asked):%d %B %H:%M %Z}, as it asks"
+    return "a minute"
 
 
 def _proxies() -> list[str]:
