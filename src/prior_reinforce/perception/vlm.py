@@ -197,7 +197,8 @@ class VisionLanguageModel(Perception):
         # Swapped thousandths fit by the picture's shape worse, as two loose boxes hardly both do.
         in_pixels = FORMATS[self.config.family].scale == "pixels"
         flat = 1.0 if in_pixels else max(wide / tall, tall / wide)
-        if _fits_better(swapped, read, min(_LOOSE, flat**0.5) if flat > _LOOSE else _LOOSE):
+        by = min(_LOOSE, flat**0.5) if flat > _LOOSE else _LOOSE
+        if _fits_better(swapped, read, by=by):
             return f"both boxes fit {self._other_order()}"
         exchanged = [_misfit(reached.box, calibration, other), _misfit(goal.box, calibration, one)]
         if _fits_better(exchanged, read):
@@ -416,7 +417,7 @@ def _step(picture: Picture) -> float:
     return max(1.0, max(picture.shape) / 1000)
 
 
-def _fits_better(swapped: list[float], read: list[float], by: float = _LOOSE) -> bool:
+def _fits_better(swapped: list[float], read: list[float], *, by: float = _LOOSE) -> bool:
     """Whether boxes fit swapped or exchanged, each better by more than a factor.
 
     Both are misfits; the factor is that by which boxes are drawn loosely, if nothing more is known.
