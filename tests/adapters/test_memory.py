@@ -2,12 +2,7 @@ import numpy as np
 import pytest
 
 from prior_reinforce.adapters import memory
-from prior_reinforce.adapters.memory import (
-    Memory,
-    likeliest_untried,
-    tried_again,
-    untried_around,
-)
+from prior_reinforce.adapters.memory import Memory, tried_again, untried_around
 from prior_reinforce.readings import Reading
 from tests.adapters.test_bayesian import CORNERS, started
 
@@ -64,15 +59,3 @@ def test_where_all_around_was_tried_it_is_looked_farther_off(k):
         assert not tried_again(left, tried, np.full_like(tried, 0.1)).any()
         tried = np.vstack([tried, left[np.argmin(np.linalg.norm(left - at, axis=1))]])
     assert np.linalg.norm(tried - at, axis=1).max() > 0.1
-
-
-@pytest.mark.parametrize(("where", "within"), [(0.15, 0.2), (2.0, 3.2), (100.0, None)])
-def test_it_is_looked_farther_off_until_something_may_hit(where, within):
-    at, none = np.ones((1, 2)), np.zeros((1, 2))
-    missed = Memory(at, np.array([0]), at, none, none, none, at * 0.1)
-    found = likeliest_untried(
-        at[0], 0.2, missed, at, lambda c: 0.9 * (np.linalg.norm(c - at, axis=1) > where)
-    )
-    away = np.linalg.norm(found - at[0])
-    assert not tried_again(found[None], at, missed.missed_by)[0]
-    assert away <= 6.4 if within is None else where < away <= within

@@ -17,7 +17,7 @@ from prior_reinforce.adapters.base import Expectation, State
 from prior_reinforce.adapters.change_points import History, announced, changes_of, split, told
 from prior_reinforce.adapters.displacement import BayesianConfig, DisplacementPrior
 from prior_reinforce.adapters.expectation_propagation import Posterior, Readings, infer
-from prior_reinforce.adapters.memory import Memory, Places, likeliest_untried, tried_again
+from prior_reinforce.adapters.memory import Memory, Places, tried_again, untried_around
 from prior_reinforce.adapters.p_hit import Belief, Targets, p_hit_after, share_within, trials_to_go
 from prior_reinforce.arrays import Point, Points
 from prior_reinforce.plans.motions import Demonstrations
@@ -216,13 +216,9 @@ class DisplacedTrials:
         sd = math.sqrt(float(np.einsum("mk,mkp->k", share, variance).max()))
         radius = tried.missed_by[-1]
         reach = radius + 2.0 * min(sd, self.config.hardware_sd[1])
-        return likeliest_untried(
-            condition,
-            reach,
-            tried,
-            tried.conditions,
-            lambda candidates: self._p_hit_now(self._places(candidates, goal), radius),
-        )
+        candidates = untried_around(condition, reach, tried.conditions, tried.missed_by)
+        p_hit = self._p_hit_now(self._places(candidates, goal), radius)
+        return np.asarray(candidates[np.argmax(p_hit)])
 
     def expect(self, condition: Point, goal: Point, tolerance: Point) -> Expectation:
         """Return what is expected of a trial; see `Adapter.expect`."""

@@ -7,7 +7,6 @@ Source: ours, so that a proposal stays below tens of milliseconds
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,8 +22,6 @@ LATEST = 8
 """The latest trials, which are never forgotten, and whose misses count for themselves (ours)."""
 _KEPT = 64
 """Trials in memory before one is forgotten for each that comes (ours)."""
-_HARDLY, _FARTHER = 0.005, 6
-"""Probability of a hit below which it is looked farther away, and how often (ours)."""
 _BLUR = 2.0
 """Standard deviations of a reading within which it leaves a hit possible (ours): only then a miss
 says more than its reading, where words are coarse, or numbers noisy."""
@@ -98,37 +95,6 @@ class Memory(Places):
             square[np.tril_indices(len(old))] = np.inf
             keep[np.unravel_index(np.argmin(square), square.shape)[0]] = False
         return keep
-
-
-def likeliest_untried(
-    condition: Point,
-    reach: Point | float,
-    missed: Memory,
-    tried: Float[np.ndarray, "m k"],
-    p_hit: Callable[[Points], Float[np.ndarray, " n"]],
-) -> Point:
-    """Return the condition around another that most probably hits and that no miss was next to.
-
-    Where hardly any may hit, it is looked for twice as far away, and again: what was read is then
-    known so well around there that other conditions near it would miss as it did.
-
-    Args:
-        condition: Shape (k,).
-        reach: How far around it is looked first.
-        missed: Trials that missed, m of them.
-        tried: Their conditions, in the same coordinates as that one.
-        p_hit: Probability that each of n conditions hits; -inf where there is no plan for it.
-    """
-    best, most = condition, -np.inf
-    for _ in range(_FARTHER):
-        around = untried_around(condition, reach, tried, missed.missed_by)
-        p = p_hit(around)
-        if p.max() > most:
-            best, most = around[np.argmax(p)], float(p.max())
-        if most > _HARDLY:
-            break
-        reach = 2.0 * reach
-    return np.asarray(best)
 
 
 def untried_around(

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from prior_reinforce.adapters.base import Expectation, State
 from prior_reinforce.adapters.displacement import BayesianConfig
-from prior_reinforce.adapters.memory import Memory, Places, likeliest_untried, tried_again
+from prior_reinforce.adapters.memory import Memory, Places, tried_again, untried_around
 from prior_reinforce.adapters.moved import EXECUTION, OF_TOLERANCE, UNIT, MovedBelief
 from prior_reinforce.adapters.moved_prior import AS_STATED, OTHER_WAY
 from prior_reinforce.adapters.p_hit import trials_to_go
@@ -287,17 +287,17 @@ class MovedTrials:
         at, radius = self._places(condition[None], goal[None]), missed.missed_by[-1]
         there = self.belief.outcomes(0, at)
         sd = np.sqrt(np.diag(self.belief.spread(0, there)[0]))
-        learned, losses = self.belief.symmetry.learned, self._losses(goal)
-        beside = np.linalg.norm(radius) / self.belief.prior.size
-        farthest = np.where(learned, beside, (1.0 + 1e-6) * self._farthest(losses))
-
-        def p_hit(candidates: Points) -> Float[np.ndarray, " n"]:
-            w = np.abs(self.belief.prior.moved(self.chart.to(candidates)))
-            p = self.p_hit(candidates, np.broadcast_to(goal, candidates.shape), radius, seed=0)
-            return np.where(np.all(w <= farthest, axis=1), p, -np.inf)
-
         tried = self.chart.back(missed.conditions)
-        return likeliest_untried(condition, radius + 2.0 * sd, missed, tried, p_hit)
+        candidates = untried_around(condition, radius + 2.0 * sd, tried, missed.missed_by)
+        w = np.abs(self.belief.prior.moved(self.chart.to(candidates)))
+        farthest = np.where(
+            self.belief.symmetry.learned, np.inf, self._farthest(self._losses(goal))
+        )
+        candidates = candidates[np.all(w <= (1.0 + 1e-6) * farthest, axis=1)]
+        if not len(candidates):
+            return condition
+        goals = np.broadcast_to(goal, candidates.shape)
+        return np.asarray(candidates[np.argmax(self.p_hit(candidates, goals, radius, seed=0))])
 
 
 def _half_way(lost: Point, read: Points) -> Point:
