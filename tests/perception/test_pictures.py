@@ -70,3 +70,13 @@ def test_what_is_none_is_named(tmp_path):
     (tmp_path / "a.png").write_text("x")
     with pytest.raises(FileFormatError, match=r"a\.png.*expected a PNG or JPEG"):
         read_picture(tmp_path / "a.png")
+
+
+@pytest.mark.parametrize("mode", ["RGBA", "LA", "P"])
+def test_what_is_transparent_has_no_colour(mode):
+    """A quarter of such a picture shows; an editor leaves any colour behind the rest."""
+    picture = Image.new("RGBA", (40, 40), (255, 120, 0, 0))
+    picture.paste((0, 0, 255, 255), (0, 0, 20, 20))
+    seen = read_picture(saved(picture.convert(mode)))
+    assert (seen[20:, 20:] == 255).all()
+    assert (seen[:20, :20] < 255).any()

@@ -19,11 +19,11 @@ _ORIENTATION = 0x0112
 its sides swapped (CIPA DC-008, 4.6.4)."""
 
 
-def stored_turn(path: Path) -> int:
+def stored_turn(source: Path | BinaryIO) -> int:
     """Return how a picture that can be read is stored: its EXIF orientation, 1 for upright."""
     from PIL import Image
 
-    with Image.open(path, formats=("PNG", "JPEG")) as image:
+    with Image.open(source, formats=("PNG", "JPEG")) as image:
         turn = image.getexif().get(_ORIENTATION, 1)
     return turn if turn in range(1, 9) else 1
 
@@ -31,8 +31,9 @@ def stored_turn(path: Path) -> int:
 def read_picture(source: Path | BinaryIO) -> Picture:
     """Read a PNG or a JPEG: RGB, upright as the camera says; of several frames the first.
 
-    Pictures of more than 8 bits are brightened until the brightest pixel is white. FileFormatError
-    if it is neither, is damaged, or has too many pixels.
+    Pictures of more than 8 bits are brightened until the brightest pixel is white, and what is
+    transparent is seen on white. FileFormatError if it is neither, is damaged, or has too many
+    pixels.
     """
     from PIL import Image, ImageOps
 
@@ -47,6 +48,9 @@ def read_picture(source: Path | BinaryIO) -> Picture:
                 grey = upright.mode[0] in "IF"
                 levels = np.asarray(upright if grey else upright.convert("RGB"), dtype=float)
                 upright = Image.fromarray((levels * (255 / max(levels.max(), 1))).astype(np.uint8))
+            elif upright.has_transparency_data:
+                seen = upright.convert("RGBA")
+                upright = Image.alpha_composite(Image.new("RGBA", seen.size, "white"), seen)
             return np.asarray(upright.convert("RGB"))
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         what = f"the picture {source}" if isinstance(source, Path) else "that as a picture"
