@@ -153,3 +153,9 @@ def test_outliers_cost_less_than_a_trial():
     assert max(clean) <= 6  # every goal is reached through the pictures,
     assert np.mean(clean) >= 1.5  # and not by the first throw
     assert np.mean(spoilt) - np.mean(clean) < 1
+
+
+@pytest.mark.parametrize("words", ["the light-blue ball", "a dark red cup", "what is not red"])
+def test_a_shade_or_the_lack_of_a_colour_is_not_taken_for_the_colour(words):
+    with pytest.raises(ConfigurationError, match="another colour"):
+        find_by_colour(np.zeros((9, 9, 3), np.uint8), words)

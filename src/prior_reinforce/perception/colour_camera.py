@@ -31,6 +31,8 @@ COLOURS = {
 """Least and greatest hue in degrees, and least saturation, of each colour that is told apart
 (ours). Table, floor, arm and shadows of our scenes are all paler."""
 
+_SHADES = "light|pale|bright|dark|deep|navy|sky|not|no|non|without"
+"""Words before a colour that make it another one than is found."""
 _DARKEST = 60
 """Least value of a pixel whose hue means anything, of 255 (ours)."""
 _SPECK = 12
@@ -120,7 +122,7 @@ def say_box(box: Box | None, size: tuple[int, int], words: str, family: Family) 
 def find_by_colour(picture: Picture, words: str) -> Box | None:
     """Find the box, in pixels, around what has the colour that the words name; None if nothing has.
 
-    ConfigurationError if the words name none of `COLOURS`, or several.
+    ConfigurationError if the words name none of `COLOURS`, several, or a shade or the lack of one.
     """
     from PIL import Image
     from scipy import ndimage
@@ -130,6 +132,11 @@ def find_by_colour(picture: Picture, words: str) -> Box | None:
         raise ConfigurationError(
             f"{words!r} names {len(named)} colours; to be found by colour it must name one of "
             f"{', '.join(COLOURS)}"
+        )
+    if shade := re.search(rf"\b({_SHADES})[\s-]*{named[0]}\b", words, re.IGNORECASE):
+        raise ConfigurationError(
+            f"{words!r}: {shade[0]!r} is not told from {named[0]} by its colour; touch it, have it "
+            "found by a model, or use an object of another colour"
         )
     low, high, least_saturation = COLOURS[named[0]]
     hue, saturation, value = np.moveaxis(np.asarray(Image.fromarray(picture).convert("HSV")), 2, 0)
