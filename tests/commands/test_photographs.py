@@ -647,6 +647,8 @@ def test_a_picture_that_is_cut_in_the_same_shape_is_no_sure_reading(drawn_table,
 
 def test_an_object_that_the_border_cuts_is_told(drawn_table, capsys):
     drawn(drawn_table / "photo.png", ball=(0.9, 1.28), hoop=(1.0, 1.1))
+    in_plane = replace(TableCalibration.load(drawn_table / "table.json"), height=0.03)
+    in_plane.save(drawn_table / "table.json")  # the ball's middle, which is drawn in it
     with VisionServer() as server:
         assert look(drawn_table, server.base_url) == 0
     said = capsys.readouterr()
@@ -698,3 +700,83 @@ def test_which_model_looks_may_stand_in_the_workspaces_manifest(drawn_table, cap
             file.write(section)
         assert main(["look", str(drawn_table / "photo.png"), *objects, *where]) == 0
     np.testing.assert_allclose(seen(capsys.readouterr().out)[::2], [0.05, 0.07], atol=0.004)
+
+
+def test_a_column_z_is_the_points_height(tmp_path, run):
+    for name in ("z", "height", "z [m]"):
+        high = points_file(
+            tmp_path / "points.csv",
+            [(x, y, 0.3, u, v) for x, y, u, v in POINTS],
+            ("x", "y", name, "u", "v"),
+        )
+        status, out, _ = run("calibrate", high, "--out", tmp_path / "table.json")
+        assert status == 0
+        assert "plane 30.0 cm above the table" in out
+    assert run("calibrate", high, "--out", tmp_path / "t.json", "--height", "0.1")[0] == 2
+    mixed = [(x, y, 0.1 * (i % 2), u, v) for i, (x, y, u, v) in enumerate(POINTS)]
+    points_file(high, mixed, ("x", "y", "z", "u", "v"))
+    status, _, err = run("calibrate", high, "--out", tmp_path / "t.json")
+    assert status == 2
+    assert "give those of one height" in err
+
+
+def test_columns_of_two_cameras_are_refused(tmp_path, run):
+    both = [(*row, 1, 2) for row in POINTS]
+    points = points_file(tmp_path / "points.csv", both, ("x", "y", "u", "v", "u", "v"))
+    status, _, err = run("calibrate", points, "--out", tmp_path / "table.json")
+    assert status == 2
+    assert "several columns u" in err
+
+
+@pytest.mark.parametrize(
+    ("head", "says"), [("x (ft)", "x is in ft"), ("cell", "save a spreadsheet")]
+)
+def test_what_is_wrong_in_a_head_is_named(tmp_path, run, head, says):
+    points = points_file(tmp_path / "points.csv", names=(head, "y", "u", "v"))
+    assert says in run("calibrate", points, "--out", tmp_path / "table.json")[2]
+
+
+def test_a_camera_in_another_unit_or_for_nothing_is_told(tmp_path, run):
+    points = points_file(tmp_path / "points.csv")
+    common = ("calibrate", points, "--out", tmp_path / "table.json", "--camera")
+    assert "needs --camera" in run(*common, "85", "0", "255")[2]
+    feet = run(*common, "2.79", "0", "8.37", "--outcome-height", "0.1")
+    assert "in metres" in feet[2]
+    assert "in metres" not in run(*common, "0.9", "0", "2.4", "--outcome-height", "0.1")[2]
+
+
+def test_a_table_that_is_typed_twice_as_wide_is_refused(drawn_table, run):
+    wide = points_file(drawn_table / "points.csv", [(x, 2 * y, u, v) for x, y, u, v in POINTS])
+    of = ("--picture", drawn_table / "photo.png", "--out", drawn_table / "wide.json")
+    status, _, err = run("calibrate", wide, *of)
+    assert status == 2
+    assert "Measure both sides" in err
+
+
+def test_a_goals_offset_in_centimetres_is_refused(drawn_table, capsys):
+    assert look(drawn_table, "http://127.0.0.1:9/v1", "--goal-offset", "0", "10") == 2
+    assert "metres" in capsys.readouterr().err
+
+
+def test_of_a_trial_that_was_told_what_is_printed_amends_it(drawn_table, capsys, run):
+    of_trial = trial_for([1.0, 0.05], drawn_table)
+    assert run("tell", drawn_table / "hoop", "1", "--error", "2 cm long, 0 cm left")[0] == 0
+    with VisionServer() as server:
+        assert look(drawn_table, server.base_url, *of_trial) == 0
+    printed = capsys.readouterr().out.splitlines()[-1].partition("prior-reinforce ")[2]
+    assert run(*shlex.split(printed))[0] == 0
+    with Workspace(drawn_table / "hoop") as workspace:
+        error = workspace.state.trial(1).reading.error_seen
+    np.testing.assert_allclose(error, [0.05, 0.07], atol=0.004)
+
+
+def test_a_goal_that_tells_no_mirrored_picture_says_so_once(drawn_table, capsys):
+    """Straight ahead: mirrored, the ball's 7 cm left is 7 cm right, and the hoop where it was."""
+    drawn(drawn_table / "photo.png", hoop=(1.0, 0.0))
+    of_trial = trial_for([1.0, 0.0], drawn_table)
+    with VisionServer() as server:
+        assert look(drawn_table, server.base_url, *of_trial) == 0
+        assert "mirrored" in capsys.readouterr().err
+        (drawn_table / "hoop/pictures/trial-000-seen.json").write_text("{}")
+        assert look(drawn_table, server.base_url, *of_trial) == 0
+    assert "mirrored" not in capsys.readouterr().err

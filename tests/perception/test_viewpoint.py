@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from prior_reinforce.perception.calibration import TableCalibration
-from prior_reinforce.perception.viewpoint import camera_costs, miss_from, possible_places
+from prior_reinforce.perception.viewpoint import (
+    camera_costs,
+    least_miss,
+    miss_from,
+    possible_places,
+    slope_at,
+)
 
 POINTS = np.array([(x, y) for x in (0.5, 0.85, 1.2) for y in (-0.4, 0.0, 0.4)])
 SIZE, FOCAL = (1280, 720), 1000.0
@@ -87,3 +93,20 @@ def test_without_the_pictures_size_nothing_is_said():
     calibration = calibrated(np.array([0.75, 0.0, 2.4]), 0.1, picture=None)
     assert len(possible_places(calibration)) == 0
     assert camera_costs(calibration, 0.1, np.array([0.0, 0.0, 1.2])) == 0.0
+
+
+def test_the_best_camera_misses_points_that_are_stretched():
+    camera = np.array([0.75, 0.0, 2.4])
+    true = calibrated(camera, 0.1)
+    stretched = TableCalibration.fit(POINTS * [1, 1.5], seen(POINTS, camera, 0.1), picture=SIZE)
+    assert least_miss(true) < 0.5
+    assert least_miss(stretched) > 20
+    assert least_miss(calibrated(camera, 0.1, picture=None)) == 0.0
+
+
+@pytest.mark.parametrize(("camera", "tilt"), [((0.0, 0.1, 1.2), 0.6), ((0.8, 0.0, 2.0), 0.0)])
+def test_what_stands_high_is_seen_as_far_behind_as_the_cameras_ray_slopes(camera, tilt):
+    place = np.array([1.1, 0.3])
+    slope = slope_at(calibrated(np.array(camera), tilt), place)
+    np.testing.assert_allclose(slope, (place - camera[:2]) / camera[2], rtol=0.15)
+    assert not slope_at(calibrated(np.array(camera), tilt, picture=None), place).any()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -24,26 +24,20 @@ from prior_reinforce.errors import (
 )
 from prior_reinforce.extras import check_installed
 from prior_reinforce.files import named_disk_errors, refuse_foreign, write
-from prior_reinforce.units import UNITS, factor, looks_like
+from prior_reinforce.units import factor, looks_like
 from prior_reinforce.wording import WORDS, axes_of, to_words
 
 if TYPE_CHECKING:
     from prior_reinforce.perception.calibration import TableCalibration
-    from prior_reinforce.perception.vlm_reading import PictureReading, Sighting
+    from prior_reinforce.perception.vlm_reading import PictureReading
 
 _COLUMNS = ("x", "y", "u", "v")
 _IN_PIXELS = re.compile(r"([uv])[\s_/\[(]+(?:in[\s_]+)?(?:px|pixels?)[\])]?", re.IGNORECASE)
 """`u [px]`, `v_px`, `u in pixels`."""
-_COARSE = 0.02
-"""Spread of a calibration that is warned of, in [m]; ours: more than any task's tolerance."""
-_BESIDE = 5.0
-"""From how many times the points' own errors on the points fix no places beside them; ours: it is
-1 to 3 where they stand in the corners of the table, with a wrong one or without."""
-_FAR_BEYOND = 0.25
-"""How far beyond the calibrated points an object is warned of, as a part of how far these are
-apart. Ours: places are extrapolated there."""
-_UPSIDE_DOWN = ({1, 3}, {6, 8})
-"""EXIF orientations half a turn apart, which a telephone that lies flat mixes up."""
+_ROUND = re.compile(r"\s*\((.*)\)$")
+"""`x (ft)`."""
+_HEIGHTS = {"height": "z", "h": "z"}
+"""Other names of a column z."""
 _EXPOSURE = 10
 """Frames, of which the last is kept; ours: the first are dark until a webcam has set itself."""
 _SAME_GOAL, _OTHER_GOAL = 0.02, 0.06
@@ -64,9 +58,9 @@ class Calibrate:
     points: Annotated[Path, tyro.conf.Positional]
     """CSV with columns x, y (table frame, in metres: forward, left) and u, v (in pixels: right,
     down), four points at least; six, in the corners and in the middles of two opposite sides, to
-    know how well it fits."""
-    height: float = 0.0
-    """Height of the points above the table, in [m]."""
+    know how well it fits. A column z is their height, and the same in all."""
+    height: float | None = None
+    """Height of the points above the table, in [m]; zero where the CSV has no column z either."""
     picture: Path | None = None
     """The photograph in which u and v were clicked: others are then scaled to its size, or refused
     where they are turned or cut."""
@@ -79,60 +73,48 @@ class Calibrate:
 
     def run(self) -> None:
         """Fit, save, and say how far each point lies from where the others put it."""
-        from prior_reinforce.perception.calibration import TableCalibration, left_out_errors
+        from prior_reinforce.perception import doubts
         from prior_reinforce.perception.pictures import read_picture, stored_turn
 
         refuse_foreign(self.out, "prior-reinforce table calibration")
-        for name, height in (("height", self.height), ("outcome-height", self.outcome_height)):
-            if height is not None and looks_like("m", height):
-                raise ConfigurationError(f"--{name} must be metres above the table, got {height}")
-        table_points, pixels = np.hsplit(_read_points(self.points), 2)
-        if looks := looks_like("m", np.abs(table_points).max(initial=0.0)):
+        table_points, pixels, stated = _read_points(self.points)
+        if self.height is not None and stated not in (None, self.height):
             raise ConfigurationError(
-                f"a point {np.abs(table_points).max():g} m away looks like {UNITS[looks].plural}; "
-                f"write x [{looks}] and y [{looks}] in the head (inches: [in]), or metres"
+                f"{self.points} says that the points are {stated:g} m high, and --height "
+                f"{self.height:g}; leave one away"
+            )
+        height = self.height if self.height is not None else stated or 0.0
+        for name, above in (("height", height), ("outcome-height", self.outcome_height)):
+            if above is not None and looks_like("m", above):
+                raise ConfigurationError(f"--{name} must be metres above the table, got {above}")
+        if (self.camera is None) != (self.outcome_height is None):
+            raise ConfigurationError(
+                "--outcome-height needs --camera X Y Z, in metres, and that serves for it only"
             )
         if np.any(pixels < 0):
             raise ConfigurationError(
                 f"pixels down to {pixels.min(axis=0).tolist()} are negative; count u to the right "
                 "and v down from the picture's top left corner"
             )
-        size = None
+        size = exif = None
         if self.picture is not None:
             tall, wide, _ = read_picture(self.picture).shape
-            size = wide, tall
+            size, exif = (wide, tall), stored_turn(self.picture)
             _check_turn(self.picture, pixels, size)
-        calibration = TableCalibration.fit(table_points, pixels, height=self.height, picture=size)
-        if self.outcome_height is not None:
-            if self.camera is None:
-                raise ConfigurationError("--outcome-height needs --camera X Y Z, in metres")
+        calibration = doubts.calibrate(table_points, pixels, height=height, picture=size, exif=exif)
+        said = doubts.of_calibration(calibration, table_points, pixels)
+        if self.camera is not None and self.outcome_height is not None:
             _check_camera(calibration, self.outcome_height, self.camera)
             calibration = calibration.at_height(self.outcome_height, np.array(self.camera))
-        exif = None if self.picture is None else stored_turn(self.picture)
-        replace(calibration, exif=exif).save(self.out)
+        calibration.save(self.out)
         print(f"{calibration.summary()}: {self.out}")
         if size is None:
             warn(
                 "without --picture a photograph of another size, turned or cut is not told from "
                 "one of this camera; give the one in which u and v were clicked"
             )
-        _, others_off = left_out_errors(table_points, pixels)
-        if calibration.sd > _COARSE:
-            # Without the point that is wrong the others agree, where they are enough to disagree;
-            # one that is not tested may be the wrong one.
-            agree = others_off <= 2 * np.nan_to_num(others_off, nan=np.inf).min() + 0.001
-            says = " or ".join(
-                f"{i + 1} ({x:g}, {y:g})"
-                for i, (x, y) in enumerate(table_points.tolist())
-                if agree[i]
-            )
-            if calibration.worst_sd > max(_COARSE, _BESIDE * calibration.fit_error):
-                remedy = " beside the points; give more, in all corners of the table"
-            elif not calibration.untested and agree.sum() <= len(agree) / 2:
-                remedy = f"; without point {says} the others agree: measure and click it again"
-            else:
-                remedy = "; give more points, in all corners; two may be exchanged, as two tags are"
-            warn(f"that is coarse{remedy}")
+        for doubt in said:
+            warn(doubt)
 
 
 @dataclass(frozen=True)
@@ -174,11 +156,14 @@ class Look:
 
     def run(self) -> None:
         """Look, keep what was seen beside the photograph, and say what to tell."""
+        from prior_reinforce.perception import doubts
         from prior_reinforce.perception.calibration import TableCalibration
         from prior_reinforce.perception.pictures import read_picture, stored_turn
         from prior_reinforce.perception.vlm import VisionLanguageModel
 
-        goal, folder, stem = self._of_trial()
+        if np.abs(self.goal_offset).max() >= 1:
+            raise ConfigurationError(f"--goal-offset is in metres, got {self.goal_offset}")
+        goal, folder, stem, verb = self._of_trial()
         around = None if goal is None else folder.parent
         drawn = folder / f"{stem}.png"
         written = drawn.with_suffix(".json")
@@ -195,21 +180,11 @@ class Look:
         )
         if self.camera is not None:
             _photograph(self.camera, self.picture)
-        picture, turn = read_picture(self.picture), stored_turn(self.picture)
-        if {calibration.exif, turn} in _UPSIDE_DOWN:
-            warn(
-                f"{self.picture} says that it is upside down against the calibration's photograph "
-                f"(EXIF orientation {turn}, and {calibration.exif}); if the camera hangs as it did "
-                "then, both errors' signs are wrong: save both as PNG, and calibrate again"
-            )
-        here = calibration.in_picture((picture.shape[1], picture.shape[0]))
-        if here.untested:
-            warn(f"{here.summary()}, and calibrate again")
-        if here is not calibration:
-            warn(
-                "the picture has another size than that of the calibration, and is scaled to it; "
-                "if it was cut instead, all places are wrong: take it as before"
-            )
+        picture = read_picture(self.picture)
+        size = picture.shape[1], picture.shape[0]
+        for doubt in doubts.of_picture(calibration, size, stored_turn(self.picture)):
+            warn(doubt)
+        here = calibration.in_picture(size)
         with VisionLanguageModel(scene, model_of(self.vlm, around), calibration=here) as model:
             reading = model.read(picture)
         if reading.unanswered:
@@ -220,10 +195,14 @@ class Look:
         error, sd = reading.error_seen, reading.sd
         if error is None or sd is None:
             raise _refused(f"{reading.problem}; look at {drawn} and tell what you see yourself")
+        behind = doubts.behind(here, reading.reached, self.reached_size, "model")
+        sd = np.maximum(sd, here.sd_off(np.maximum(reading.reached.off, behind)))
         for sighting, name in ((reading.reached, "reached"), (reading.goal, "goal")):
             if sighting is not None:
-                _warn_if_beyond(here, sighting)
-                _warn_if_off(here, sighting, name)
+                for doubt in doubts.of_sighting(here, sighting, f"say --no-{name}-round"):
+                    warn(doubt)
+        for doubt in doubts.of_slant(here, self.reached, self.reached_size, behind):
+            warn(doubt)
         if reading.scale != 1:
             warn(
                 f"both objects look {reading.scale:.2f} times as large as they are: is the picture "
@@ -245,7 +224,7 @@ class Look:
         )
         if goal is None:
             of, right = "FOLDER TRIAL", f"{right}, and outcomes are x and y"
-        print(f'{right}: prior-reinforce tell {of} --error "{told}"')
+        print(f'{right}: prior-reinforce {verb} {of} --error "{told}"')
 
     def _beside_goal(
         self, here: TableCalibration, reading: PictureReading, goal: Point, drawn: Path
@@ -257,11 +236,17 @@ class Look:
         beside = reading.goal_place - goal
         moved = float(np.linalg.norm(beside))
         says = f"{self.goal} is seen {100 * moved:.1f} cm from the goal that is set; "
+        first = not [*drawn.parent.glob("*-seen.json")][1:]
         (u, v), (tall, wide) = here.to_pixels(reading.goal.place), reading.picture.shape[:2]
         flips = {"turned by half a turn": (wide - u, tall - v), "mirrored": (wide - u, v)}
         offset = reading.goal_place - reading.goal.place - goal
         offs = {how: here.to_table(np.array(at)) + offset for how, at in flips.items()}
         off, how = min((float(np.linalg.norm(off)), how) for how, off in offs.items())
+        if first and off <= _SAME_GOAL >= moved:
+            warn(
+                f"in the picture {how}, {self.goal} would be seen at the goal as well: look once "
+                f"whether left in the picture is left of the goal in {drawn}"
+            )
         if moved > _OTHER_GOAL and off <= min(max(_SAME_GOAL, 3 * here.sd), moved / 3):
             raise _refused(
                 f"{says}in the picture {how} it would be seen {100 * off:.1f} cm from it: is the "
@@ -276,10 +261,10 @@ class Look:
             warn(f"{says}check the calibration, or move it there")
         return beside
 
-    def _of_trial(self) -> tuple[Point | None, Path, str]:
-        """The goal (x, y) [m] of the trial, where to keep what is seen, and its name there."""
+    def _of_trial(self) -> tuple[Point | None, Path, str, str]:
+        """The goal (x, y) [m] of the trial, where to keep what is seen, its name, and the verb."""
         if self.workspace is None and self.trial is None:
-            return None, self.picture.parent, f"{self.picture.stem}-seen"
+            return None, self.picture.parent, f"{self.picture.stem}-seen", "tell"
         from prior_reinforce.arm.workspace.manifest import workspace_around
         from prior_reinforce.arm.workspace.text import tell_example
         from prior_reinforce.arm.workspace.workspace import Workspace
@@ -295,8 +280,10 @@ class Look:
                     f"a photograph from above shows x and y, but outcomes are {form}; look at it "
                     f"yourself, and tell {tell_example(workspace.manifest)}"
                 )
-            goal = state.goal_of(state.trial(self.trial)).goal * np.array(metres, float)
-        return goal[np.argsort(axes)], folder / "pictures", f"trial-{self.trial:03d}-seen"
+            trial = state.trial(self.trial)
+            goal = state.goal_of(trial).goal * np.array(metres, float)
+            verb = "tell" if trial.open else "amend"
+        return goal[np.argsort(axes)], folder / "pictures", f"trial-{self.trial:03d}-seen", verb
 
 
 def _refused(why: str) -> PerceptionFailedError:
@@ -304,40 +291,6 @@ def _refused(why: str) -> PerceptionFailedError:
     error = PerceptionFailedError(why)
     error.changed = True
     return error
-
-
-def _warn_if_beyond(calibration: TableCalibration, sighting: Sighting) -> None:
-    """Warn of an object that is seen far outside the box around the clicked points."""
-    if calibration.clicked is None or sighting.box is None:
-        return
-    left, top, right, bottom = calibration.clicked
-    u, v = (sighting.box[0] + sighting.box[2]) / 2, (sighting.box[1] + sighting.box[3]) / 2
-    nearest = np.array([np.clip(u, left, right), np.clip(v, top, bottom)])
-    place, edge = calibration.to_table(np.array([u, v])), calibration.to_table(nearest)
-    ends = calibration.to_table(np.array([[left, top], [right, bottom]]))
-    beyond, across = np.linalg.norm(place - edge), np.linalg.norm(ends[1] - ends[0])
-    if beyond > _FAR_BEYOND * across:
-        warn(
-            f"{sighting.words} is seen {100 * beyond:.0f} cm beyond the calibrated points, which "
-            f"are {100 * across:.0f} cm apart: there nothing tells how far off its place is; "
-            "calibrate with points all around"
-        )
-
-
-def _warn_if_off(calibration: TableCalibration, sighting: Sighting, name: str) -> None:
-    """Warn of an object whose box is not around it alone and as a whole."""
-    if sighting.off_by is None or (calibration.sd_off(sighting.off) <= calibration.sd).all():
-        return
-    may_be = f"its middle may be {100 * np.linalg.norm(sighting.off):.1f} cm off"
-    warn(
-        {
-            "cut": f"{sighting.words} is cut by the picture's border: {may_be}; show all of it",
-            "hidden": f"{sighting.words} is half hidden: {may_be}; show all of it, or say "
-            f"--no-{name}-round if it is not round",
-            "too large": f"the box of {sighting.words} is larger than it is: {may_be}; is "
-            "something else in it, is its size right?",
-        }[sighting.off_by]
-    )
 
 
 def _check_turn(picture: Path, pixels: Float[np.ndarray, "n 2"], size: tuple[int, int]) -> None:
@@ -364,10 +317,13 @@ def _check_camera(
     calibration: TableCalibration, height: float, camera: tuple[float, float, float]
 ) -> None:
     """Warn of a camera that hangs elsewhere than the known points' perspective says."""
+    from prior_reinforce.perception.doubts import COARSE
     from prior_reinforce.perception.viewpoint import camera_costs, possible_places
 
+    if looks_like("m", float(np.abs(camera).max())):
+        warn(f"a camera {max(map(abs, camera)):g} m away? measure --camera in metres")
     cost = camera_costs(calibration, height, np.array(camera))
-    if cost > _COARSE >= calibration.sd:  # coarse points tell of no camera
+    if cost > COARSE >= calibration.sd:  # coarse points tell of no camera
         first, last = possible_places(calibration)[[0, -1]]
         ends = " and ".join(
             " ".join(f"{round(c, 2) + 0:.2f}" for c in place) for place in (first, last)
@@ -401,31 +357,47 @@ def _photograph(camera: str, path: Path) -> None:
         write(path, cv2.imencode(path.suffix, frame)[1].tobytes())
 
 
-def _read_points(path: Path) -> Float[np.ndarray, "n 4"]:
-    """Rows of x, y [m] (a head may say `x [cm]`), u, v [px]; rows without any are skipped."""
+def _read_points(
+    path: Path,
+) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2"], float | None]:
+    """Rows of x, y [m] (a head may say `x [cm]`) and u, v [px], and the height in a column z [m].
+
+    Rows without any are skipped.
+    """
     from prior_reinforce.arm.recordings.tables import read_table
     from prior_reinforce.arm.recordings.units import split_unit
 
     table = read_table(path, head=_COLUMNS)
     heads = [_IN_PIXELS.sub(r"\1 [px]", name.strip()) for name in table.names]
-    split = [split_unit(name, any_word=True) for name in heads]
-    names = [name.lower() for name, _ in split]
+    split = [split_unit(_ROUND.sub(r" [\1]", name), any_word=True) for name in heads]
+    names = [_HEIGHTS.get(name.lower(), name.lower()) for name, _ in split]
     if missing := {*_COLUMNS} - {*names}:
         raise FileFormatError(
-            f"{path} has no column {min(missing)}; expected a CSV with the columns "
-            f"{', '.join(_COLUMNS)} (or with a unit: x [mm]) and a number in each"
+            f"{path} has no column {min(missing)}; expected a CSV (save a spreadsheet as one) with "
+            f"the columns {', '.join(_COLUMNS)} (or with a unit: x [mm]) and a number in each"
         )
-    at = [names.index(name) for name in _COLUMNS]
+    columns = [*_COLUMNS, *({"z"} & {*names})]
+    if twice := [name for name in columns if names.count(name) > 1]:
+        raise FileFormatError(f"{path} has several columns {twice[0]}; keep that of this camera")
+    at = [names.index(name) for name in columns]
     units = [table.units[c] or split[c][1] for c in at]
-    scale = [factor(unit or "m", "m") for unit in units[:2]] + [
-        1.0 if unit in (None, "px") else None for unit in units[2:]
+    scale = [
+        (1.0 if unit in (None, "px") else None) if name in "uv" else factor(unit or "m", "m")
+        for name, unit in zip(columns, units, strict=True)
     ]
-    for name, unit, known in zip(_COLUMNS, units, scale, strict=True):
+    for name, unit, known in zip(columns, units, scale, strict=True):
         if known is None:
-            wanted = "m, cm, mm or in" if name in "xy" else "px, from the picture's top left corner"
+            wanted = "px, from the picture's top left corner" if name in "uv" else "m, cm, mm or in"
             raise FileFormatError(
                 f"{path}: {name} is in {unit}; give it in {wanted}, and say so in the head: "
                 f"{name} [{wanted.split(',')[0]}]"
             )
     rows = table.rows([i for i in range(len(table)) if any(table.cells[c][i] for c in at)])
-    return rows.columns(at) * np.array(scale, float)
+    points = rows.columns(at) * np.array(scale, float)
+    heights = np.unique(points[:, 4:])
+    if len(heights) > 1:
+        raise FileFormatError(
+            f"{path}: points are {heights[0]:g} to {heights[-1]:g} m high, but a calibration is of "
+            "one plane; give those of one height"
+        )
+    return points[:, :2], points[:, 2:4], float(heights[0]) if len(heights) else None

@@ -1,4 +1,4 @@
-"""Where the camera hangs, as far as the known points' perspective tells: a check of tape measures.
+"""Where the camera hangs, as far as the known points' perspective tells, and whether any does.
 
 A homography of a camera with square pixels, whose optical axis meets the picture's middle, has one
 unknown, the focal length f: each f puts the camera somewhere, and most do not fit the perspective.
@@ -26,8 +26,42 @@ def possible_places(calibration: TableCalibration) -> Float[np.ndarray, "n 3"]:
 
     None where the picture's size, or where the points were clicked, is not known.
     """
+    places, misses = _places_by_focal_length(calibration)
+    return places[misses <= misses.min(initial=np.inf) + _SLACK]
+
+
+def least_miss(calibration: TableCalibration) -> float:
+    """Return how far off the best camera with square pixels sees the points, in [px].
+
+    0 where nothing is known. Other points than the clicked ones are seen so where a length was
+    measured or typed wrongly, or begun at another corner, in all of them alike.
+    """
+    _, misses = _places_by_focal_length(calibration)
+    return float(misses.min(initial=np.inf)) if len(misses) else 0.0
+
+
+def slope_at(
+    calibration: TableCalibration, place: Float[np.ndarray, "2"]
+) -> Float[np.ndarray, "2"]:
+    """Return how far behind its foot what stands at a place is seen, in [m] per [m] of height.
+
+    Zero where nothing is known. Where any f fits, as from straight above, f is near 0.7 of the
+    picture's longer side, as in telephones and webcams (ours).
+    """
+    places = possible_places(calibration)
+    if not len(places):
+        return np.zeros(2)
+    camera = places[len(places) // 3]
+    slope: Float[np.ndarray, "2"] = (place - camera[:2]) / (camera[2] - calibration.height)
+    return slope
+
+
+def _places_by_focal_length(
+    calibration: TableCalibration,
+) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, " n"]]:
+    """For each f, where the camera hangs that sees the points best, and how far off, in [px]."""
     if calibration.picture is None or calibration.clicked is None:
-        return np.empty((0, 3))
+        return np.empty((0, 3)), np.empty(0)
     corners = _corners(calibration.clicked)
     on_table = calibration.to_table(corners)
     near = on_table.mean(axis=0)
@@ -44,7 +78,7 @@ def possible_places(calibration: TableCalibration) -> Float[np.ndarray, "n 3"]:
         shift = centred[:, 2] / [focal, focal, 1.0] / stretch.mean()
         misses.append(_miss(focal, (on_table - near) @ axes.T + shift, corners - middle))
         places.append([*near, calibration.height] - turn.T @ shift)
-    return np.array(places)[np.array(misses) <= min(misses) + _SLACK]
+    return np.array(places), np.array(misses)
 
 
 def miss_from(calibration: TableCalibration, camera: Float[np.ndarray, "3"]) -> float:
