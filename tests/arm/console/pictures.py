@@ -14,9 +14,9 @@ _TABLE_PX = 1000
 
 
 def homography():
-    """Table (x, y, 1) in [m] to pixels, as an oblique camera sees it."""
+    """Table (x, y, 1) in [m] to pixels, as a pinhole at (0.34, 0.015, 1.0), f = 960 px, sees it."""
     table = np.array([[0.5, 0.5], [0.5, -0.5], [1.3, -0.5], [1.3, 0.5]])
-    pixels = np.array([[140, 690], [1150, 700], [960, 60], [330, 55]])
+    pixels = np.array([[145, 676], [1144, 683], [1007, 83], [285, 75]])
     return cv2.getPerspectiveTransform(table.astype(np.float32), pixels.astype(np.float32))
 
 

@@ -9,11 +9,12 @@ import pytest
 from PIL import Image, ImageDraw
 
 from prior_reinforce.arm.console.camera import Calibrate, Look, Pictures, _known_points
-from prior_reinforce.arm.console.verbs import Ask, SetGoal
+from prior_reinforce.arm.console.verbs import Ask, SetGoal, Tell
 from prior_reinforce.errors import ConfigurationError, FileFormatError, PerceptionFailedError
 from prior_reinforce.perception.calibration import CAMERA_SD, TableCalibration
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 from tests.arm.console.pictures import jpeg, pixel
+from tests.perception.vision_server import VisionServer
 
 KNOWN = [[0.6, 0.4], [0.6, 0.0], [0.6, -0.4], [1.2, -0.4], [1.2, 0.0], [1.2, 0.4]]
 
@@ -198,7 +199,7 @@ def test_the_calibration_is_scaled_to_a_picture_of_its_shape_and_kept_from_other
         return pictures.keep(encoded.getvalue())
 
     smaller = shown((640, 360))
-    assert "another size" in smaller.summary
+    assert "another size" in " ".join(smaller.doubts)
     at = np.array(pixel([0.8, 0.2])) / 2
     np.testing.assert_allclose(to_table(smaller, at), [0.8, 0.2], atol=1e-6)
     found = pictures.find(Look("the orange ball", 0.04))
@@ -223,3 +224,85 @@ def test_a_tag_that_is_seen_twice_is_named(pictures):
     pictures.keep(encoded.getvalue())
     with pytest.raises(PerceptionFailedError, match="tag 1 is seen 2 times"):
         pictures.tags()
+
+
+def test_the_picture_of_a_trial_is_not_read_for_the_next(pictures, verbs):
+    calibrated(pictures)
+    state = verbs.goal(SetGoal(seen=verbs.state().id, goal=[0.9, 0.0]))
+    state = verbs.ask(Ask(seen=state.id))
+    with pytest.raises(PerceptionFailedError, match="take one"):
+        pictures.find(Look("the orange ball", 0.04))
+    pictures.keep(jpeg(ball=(0.93, 0.07)))
+    pictures.find(Look("the orange ball", 0.04))
+    state = verbs.tell(Tell(seen=state.id, trial=1, error=[0.03, 0.07]))
+    assert pictures.look_up().of == "trial 1"  # and says so
+    verbs.ask(Ask(seen=state.id))
+    assert pictures.look_up().picture == ""
+    with pytest.raises(PerceptionFailedError, match="take one"):
+        pictures.find(Look("the orange ball", 0.04))
+    # The first trial is corrected: its picture counts, and another one is kept as its own.
+    assert pictures.look_up(1).of == "trial 1"
+    pictures.keep(jpeg(ball=(0.8, 0.1)), 1)
+    found = pictures.find(Look("the orange ball", 0.04, trial=1))
+    np.testing.assert_allclose(found.place, [0.8, 0.1], atol=0.003)
+    assert pictures.look_up().picture == ""
+
+
+@pytest.mark.parametrize("turn", [2, 3, 4])
+def test_a_telephones_picture_that_is_turned_or_mirrored_is_told(pictures, turn):
+    calibrated(pictures)
+    assert pictures.look_up().doubts == []
+    encoded, exif = io.BytesIO(), Image.Exif()
+    exif[0x0112] = turn
+    Image.open(io.BytesIO(jpeg(ball=(0.93, 0.07)))).save(encoded, "JPEG", exif=exif)
+    camera = pictures.keep(encoded.getvalue())
+    assert f"EXIF orientation {turn}, and 1" in camera.doubts[0]
+    assert camera.doubts == pictures.look_up().doubts
+    pictures.calibrate(Calibrate(KNOWN, [pixel(p) for p in KNOWN]))  # as its viewer shows it
+    assert pictures.look_up().doubts == []
+
+
+@pytest.mark.parametrize("per", [100.0, 0.01])
+def test_points_in_metres_for_centimetres_or_the_other_way_round_are_refused(pictures, per):
+    pictures.keep(jpeg())
+    points = [[per * x, per * y] for x, y in KNOWN]
+    with pytest.raises(ConfigurationError, match="centimetres"):
+        pictures.calibrate(Calibrate(points, [pixel(p) for p in KNOWN]))
+
+
+def test_a_table_that_is_typed_twice_as_wide_is_refused(pictures):
+    pictures.keep(jpeg())
+    with pytest.raises(ConfigurationError, match="Measure both sides"):
+        pictures.calibrate(Calibrate([[x, 2 * y] for x, y in KNOWN], [pixel(p) for p in KNOWN]))
+    assert pictures.look_up().to_table is None
+
+
+def test_a_ball_that_is_seen_from_the_side_is_as_unsure_as_that_makes_it(pictures):
+    """On its table it stands where its ring lies; its middle, 2 cm up, is seen 1.1 cm behind."""
+    calibrated(pictures)
+    image = Image.open(io.BytesIO(jpeg()))
+    u, v = pixel([0.95, 0.0])
+    r = np.linalg.norm(np.subtract(pixel([0.95, 0.02]), [u, v]))
+    ImageDraw.Draw(image).circle((u, v), r, fill=(255, 140, 0))
+    encoded = io.BytesIO()
+    image.save(encoded, "JPEG", quality=95)
+    pictures.keep(encoded.getvalue())
+    found = pictures.find(Look("the orange ball", 0.04))
+    assert found.sd == pytest.approx(0.02 * (0.95 - 0.34) / 1.0, rel=0.15)
+    assert "--outcome-height 0.02" in found.doubts[0]
+
+
+def test_a_model_that_answers_in_another_scale_is_not_believed(verbs):
+    with VisionServer("qwen2.5-vl") as server:  # in pixels, read as thousandths
+        config = VisionLanguageModelConfig(base_url=server.base_url, family="qwen3-vl", votes=1)
+        pictures = Pictures(verbs, config)
+        pictures.keep(jpeg(ball=(0.7, 0.2)))
+        pictures.calibrate(Calibrate(KNOWN, [pixel(p) for p in KNOWN]))
+        with pytest.raises(PerceptionFailedError, match="Touch it"):
+            pictures.find(Look("the orange ball", 0.04, "model"))
+
+
+def test_an_object_beyond_the_known_points_is_told(pictures):
+    near = [[0.6 + 0.2 * (x - 0.6), 0.3 * y] for x, y in KNOWN]
+    calibrated(pictures, near)
+    assert "beyond" in " ".join(pictures.find(Look("the orange ball", 0.04)).doubts)

@@ -820,6 +820,50 @@ def test_the_camera_from_calibration_to_a_reading(at, serve, tmp_path):
     assert not page.faults
 
 
+def test_what_is_typed_beside_a_picture_is_read_as_it_stands_or_not_at_all(at, serve, tmp_path):
+    """With a comma; a unit is not guessed, and no old value is kept silently."""
+    served = serve()
+    page = at(served, TABLET, permissions=["camera"])
+    touch(page, [0.9, 0.05])
+    page.click("#goal")
+    page.click("#execute")
+    page.click("#start")
+    page.click("#take")
+    page.click("#calibrate")
+    for i, place in enumerate(page.evaluate("L.points")):
+        page.click(f"#point-{i}")
+        touch(page, pixel(place), "picture")
+    right = page.input_value("#known-1-0")
+    for wrong in ("24 in", ""):
+        page.fill("#known-1-0", wrong)
+        page.click("#known-1-1")
+        expect(page.locator("#fit")).to_be_disabled()
+        expect(page.locator("#fit")).to_contain_text("Point 2 is no number")
+    shot(page, "unread", tmp_path)
+    page.fill("#known-1-0", f"{right},0")
+    page.click("#known-1-1")
+    page.click("#fit")
+    expect(page.locator("#camera")).to_contain_text("Calibrated to 0.")
+    page.click("#sum-find")
+    page.fill("#size", "4 cm")
+    page.click("#colour")
+    expect(page.locator("#alert")).to_contain_text("no number of centimetres")
+    page.fill("#size", "2,4")  # of a ball of 4 cm
+    page.click("#colour")
+    expect(page.locator("#camera")).to_contain_text("is larger than it is")
+    accessible(page)
+    shot(page, "doubts", tmp_path)
+    page.click("#tell")  # after which the next plan is got, of whose trial there is no picture yet
+    expect(page.locator("#execute")).to_have_text(re.compile("Throw 2"))
+    expect(page.locator("#photo")).to_have_count(1)
+    expect(page.locator("#colour")).to_have_count(0)
+    expect(page.locator("#map")).to_be_visible()
+    shot(page, "next", tmp_path)
+    page.click("#amend-1")
+    expect(page.locator("#colour")).to_be_attached()
+    assert not page.faults
+
+
 def test_a_console_that_is_lost_comes_back_and_shows_nothing_without_the_link(
     at, serve, browser, tmp_path
 ):

@@ -1,14 +1,16 @@
 """A picture of the table: calibrated by known points, and where the object lies in it.
 
 Files in the workspace: `camera.json`, the calibration; `pictures/table.jpg` and
-`pictures/trial-003.jpg`, the latest picture of the table and of a trial. A picture comes from any
-camera, and the page sends it: what shows the table to the browser is none of our business. Tags to
-be printed (`tags.svg`, 40 mm wide) are OpenCV's AprilTags of the family 36h11.
+`pictures/trial-003.jpg`, the latest picture of the table and of a trial. While a trial waits to be
+told, or an older one is corrected, only its own counts. A picture comes from any camera, and the
+page sends it: what shows the table to the browser is none of our business. Tags to be printed
+(`tags.svg`, 40 mm wide) are OpenCV's AprilTags of the family 36h11.
 """
 
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
@@ -21,9 +23,10 @@ from prior_reinforce.arm.console.view import ConsoleState
 from prior_reinforce.environment import SeenObject, TableScene
 from prior_reinforce.errors import ConfigurationError, PerceptionFailedError
 from prior_reinforce.files import named_disk_errors, require_inside, sha256, write
+from prior_reinforce.perception import doubts
 from prior_reinforce.perception.calibration import CAMERA_SD, TableCalibration
 from prior_reinforce.perception.colour_camera import ColourClient
-from prior_reinforce.perception.pictures import read_picture
+from prior_reinforce.perception.pictures import read_picture, stored_turn
 from prior_reinforce.perception.vlm import VisionLanguageModel
 from prior_reinforce.perception.vlm_client import VisionLanguageModelConfig
 
@@ -41,10 +44,14 @@ class Camera(Struct):
     points: list[list[float]]
     """Known points (x, y) of the last calibration, or places to begin with, in [m]."""
     picture: str = ""
-    """Hash of the latest picture; empty where there is none."""
+    """Hash of the picture; empty where there is none."""
+    of: str = ""
+    """What it is of: `trial 3` or `the table`."""
     to_table: list[list[float]] | None = None
     """Homography from its pixels to the table, in [m]; None until it is calibrated."""
     summary: str = ""
+    doubts: list[str] = []
+    """Why the calibration, or the picture, may be wrong."""
     sd: float = CAMERA_SD
     """Of each component of a place that is touched in the picture, in [m]."""
 
@@ -56,6 +63,8 @@ class Calibrate(Struct, forbid_unknown_fields=True):
     """(x, y), in [m]."""
     pixels: list[tuple[float, float]]
     """(u, v), in [px] from the picture's top left corner."""
+    trial: int | None = None
+    """Whose picture; 0 for the latest of all, None for that of the one that waits to be told."""
 
 
 class Look(Struct, forbid_unknown_fields=True):
@@ -68,6 +77,8 @@ class Look(Struct, forbid_unknown_fields=True):
     by: Literal["colour", "model"] = "colour"
     round: bool = True
     """Whether it is as wide from all sides; a flatter box is then taken for a part of it."""
+    trial: int | None = None
+    """Whose picture; 0 for the latest of all, None for that of the one that waits to be told."""
 
 
 class Found(Struct):
@@ -79,6 +90,8 @@ class Found(Struct):
     """What its centre stands on, (x, y) in [m]."""
     sd: float
     """Of each component of the place, in [m]: larger where the box shows a part of the object."""
+    doubts: list[str]
+    """Why it may not stand there."""
 
 
 class Pictures:
@@ -89,57 +102,69 @@ class Pictures:
         self._verbs, self._vlm = verbs, vlm
         self._folder = verbs.folder / "pictures"
 
-    def look_up(self) -> Camera:
-        """Say what is known of the camera."""
+    def look_up(self, trial: int | None = None) -> Camera:
+        """Say what is known of the camera, and of a trial's picture (`trial` as in `Look`)."""
         camera = Camera(_known_points(self._verbs.state()))
-        if (path := self._latest()) is not None:
+        if (path := self._picture(trial)) is not None:
             camera.picture = sha256(path.read_bytes())[:16]
+            camera.of = "the table" if path.stem == "table" else f"trial {int(path.stem[6:])}"
         if (calibration := self._calibration()) is None:
             return camera
         camera.summary, camera.sd = calibration.summary(), calibration.sd
         try:
-            here = calibration if path is None else calibration.in_picture(_size(path))
+            if path is not None:
+                camera.doubts = doubts.of_picture(calibration, _size(path), _turn(path))
+                calibration = calibration.in_picture(_size(path))
         except ConfigurationError as error:
             camera.summary = str(error)
             return camera
-        if here is not calibration:
-            camera.summary += ", in a picture of another size that is scaled"
-        camera.to_table = np.linalg.inv(here.homography).tolist()
+        camera.to_table = np.linalg.inv(calibration.homography).tolist()
         return camera
 
-    def keep(self, content: bytes) -> Camera:
-        """Keep a picture of the table, or of the trial that waits to be told."""
+    def keep(self, content: bytes, trial: int | None = None) -> Camera:
+        """Keep a picture of a trial, of the one that waits to be told, or (0) of the table."""
         from PIL import Image
 
         encoded = io.BytesIO()  # anew: nothing that a file hides goes into the workspace
-        Image.fromarray(read_picture(io.BytesIO(content))).save(encoded, "JPEG", quality=92)
-        trial = self._verbs.state().open_trial
-        name = "table.jpg" if trial is None else f"trial-{trial.number:03d}.jpg"
+        picture, turn = read_picture(io.BytesIO(content)), stored_turn(io.BytesIO(content))
+        note = f"{_TURN}{turn}"
+        Image.fromarray(picture).save(encoded, "JPEG", quality=92, comment=note)
+        trial = self._that_waits() if trial is None else trial
+        if trial:
+            self._verbs.workspace.state.trial(trial)
+        name = _name(trial)
         with named_disk_errors(self._folder):
             write(require_inside(self._folder / name, self._verbs.folder), encoded.getvalue())
         self._verbs.publish({"camera": name})
-        return self.look_up()
+        return self.look_up(trial)
 
-    def file(self) -> Path:
-        """Return the latest picture."""
-        if (path := self._latest()) is None:
+    def file(self, trial: int | None = None) -> Path:
+        """Return the picture of a trial (`trial` as in `Look`)."""
+        if (path := self._picture(trial)) is None:
             raise PerceptionFailedError("there is no picture yet; take one")
         return path
 
     def calibrate(self, body: Calibrate) -> Camera:
-        """Fit the table to known points in the latest picture, and keep the calibration."""
-        size = _size(self.file())
-        calibration = TableCalibration.fit(body.points, body.pixels, picture=size)
+        """Fit the table to known points in the picture, and keep the calibration."""
+        path = self.file(body.trial)
+        calibration = doubts.calibrate(
+            body.points, body.pixels, picture=_size(path), exif=_turn(path)
+        )
         with named_disk_errors(self._verbs.folder):
             calibration.save(require_inside(self._verbs.folder / "camera.json", self._verbs.folder))
         self._verbs.publish({"camera": "calibrated"})
-        return self.look_up()
+        camera = self.look_up(body.trial)
+        camera.doubts = [
+            *doubts.of_calibration(calibration, body.points, body.pixels),
+            *camera.doubts,
+        ]
+        return camera
 
-    def tags(self) -> dict[int, list[float]]:
+    def tags(self, trial: int | None = None) -> dict[int, list[float]]:
         """Find printed tags: pixel of the centre of each, tag k lying on known point k."""
         import cv2
 
-        grey = cv2.cvtColor(read_picture(self.file()), cv2.COLOR_RGB2GRAY)
+        grey = cv2.cvtColor(read_picture(self.file(trial)), cv2.COLOR_RGB2GRAY)
         numbers, corners = _tags_in(grey, _FAMILY)
         if not len(numbers):
             families = (name for name in dir(cv2.aruco) if name.startswith("DICT_"))
@@ -160,27 +185,62 @@ class Pictures:
         return {int(number) + 1: _crossing(four.reshape(4, 2)) for number, four in found}
 
     def find(self, body: Look) -> Found:
-        """Find an object in the latest picture, by its colour or by a vision-language model."""
+        """Find an object in the picture, by its colour or by a vision-language model."""
         calibration = self._calibration()
         if calibration is None:
             raise ConfigurationError("the camera is not calibrated; touch the known points first")
         wanted = SeenObject(body.words, body.size, body.round)
         scene = TableScene(wanted, wanted, plane_height=calibration.height)
-        client = ColourClient(self._vlm.family) if body.by == "colour" else None
-        with VisionLanguageModel(scene, self._vlm, client=client, calibration=calibration) as model:
-            sighting = model.find(wanted, read_picture(self.file()))
+        path = self.file(body.trial)
+        of_picture = doubts.of_picture(calibration, _size(path), _turn(path))
+        here, by_colour = calibration.in_picture(_size(path)), body.by == "colour"
+        client = ColourClient(self._vlm.family) if by_colour else None
+        with VisionLanguageModel(scene, self._vlm, client=client, calibration=here) as model:
+            sighting = model.find(wanted, read_picture(path))
+        if not by_colour and (why := doubts.misread(here, sighting, body.size, round=body.round)):
+            raise PerceptionFailedError(f"{why} Touch it in the picture")
         if sighting.box is None or sighting.place is None:
             raise PerceptionFailedError(f"{sighting.problem}; touch it in the picture")
-        sd = calibration.sd_off(sighting.off).max()
-        return Found([*sighting.box], sighting.place.tolist(), float(sd))
+        behind = doubts.behind(here, sighting, body.size, body.by)
+        said = [
+            *of_picture,
+            *doubts.of_sighting(here, sighting, "untick 'It is round'"),
+            *doubts.of_slant(here, body.words, body.size, behind),
+        ]
+        sd = here.sd_off(np.maximum(sighting.off, behind)).max()
+        return Found([*sighting.box], sighting.place.tolist(), float(sd), said)
 
     def _calibration(self) -> TableCalibration | None:
         path = require_inside(self._verbs.folder / "camera.json", self._verbs.folder)
         return TableCalibration.load(path) if path.is_file() else None
 
-    def _latest(self) -> Path | None:
-        taken = (p for p in self._folder.glob("*.jpg") if not p.is_symlink())
-        return max(taken, key=lambda path: path.stat().st_mtime_ns, default=None)
+    def _picture(self, trial: int | None) -> Path | None:
+        trial = self._that_waits() if trial is None else trial
+        taken = self._folder.glob(_name(trial) if trial else "*.jpg")
+        mine = (p for p in taken if _OURS.fullmatch(p.name) and not p.is_symlink())
+        return max(mine, key=lambda path: path.stat().st_mtime_ns, default=None)
+
+    def _that_waits(self) -> int:
+        waits = self._verbs.state().open_trial
+        return 0 if waits is None else waits.number
+
+
+def _name(trial: int) -> str:
+    return f"trial-{trial:03d}.jpg" if trial else "table.jpg"
+
+
+_OURS = re.compile(r"table\.jpg|trial-\d+\.jpg")
+_TURN = "EXIF orientation was "
+"""A kept picture's comment; it is kept upright."""
+
+
+def _turn(path: Path) -> int:
+    """EXIF orientation of the photograph that `keep` was given; 1 where nothing says it."""
+    from PIL import Image
+
+    with Image.open(path) as image:
+        note = image.info.get("comment", b"").decode(errors="replace")
+    return int(note[-1]) if re.fullmatch(f"{_TURN}[1-8]", note) else 1
 
 
 _PLACES = [[0.6, 0.3], [0.6, 0.0], [0.6, -0.3], [1.2, -0.3], [1.2, 0.0], [1.2, 0.3]]

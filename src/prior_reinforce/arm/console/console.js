@@ -340,8 +340,8 @@ function draw() {
   const goal = goalNow();
   $("task").textContent = goal ? `${S.task} · goal ${goal.number}: ${sayPlace(goal.goal)}` : S.task;
   $("stage").hidden = !mapped();
-  const pictured = L.view === "picture" && C;
-  $("map").toggleAttribute("hidden", Boolean(pictured));
+  const pictured = inPicture();
+  $("map").toggleAttribute("hidden", pictured);
   $("picture").toggleAttribute("hidden", !pictured || Boolean(stream));
   $("video").hidden = !pictured || !stream;
   announce(`${title()}. ${said()}`);
@@ -351,9 +351,9 @@ function draw() {
   drawAct();
   drawPlan();
   drawHistory();
+  drawCamera();
   drawPicture();
   drawRecordings();
-  drawCamera();
 }
 
 const said = () => {
@@ -543,7 +543,7 @@ function drawBar() {
   if (waiting && waiting.stage !== "executed") legend.push("dashed: where the next plan aims");
   $("legend").textContent = legend.join(" · ");
   fill("mapbar",
-    mapped() && C && (C.picture || stream || C.to_table) && button("view", L.view === "picture" ? "Map" : "Picture", () => { L.view = L.view === "picture" ? "map" : "picture"; draw(); }),
+    mapped() && C && (C.picture || stream) && button("view", inPicture() ? "Map" : "Picture", () => { L.view = L.view === "picture" ? "map" : "picture"; draw(); }),
     button("nearer", "+", () => { L.zoom = Math.min(8, L.zoom ? L.zoom * 2 : 1); draw(); }, "", { "aria-label": "Nearer", disabled: L.zoom >= 8 }),
     button("farther", "−", () => { L.zoom = L.zoom > 1 ? L.zoom / 2 : 0; draw(); }, "", { "aria-label": "Farther", disabled: L.zoom === 0 }));
 }
@@ -673,9 +673,15 @@ function fields() {
   }))));
 }
 const typedNumber = (c, i) => {
-  const said = (L.typed[i] || "").trim().replace(",", ".");
-  return said && Number.isFinite(+said) ? +said / c.factor : null;
+  const said = plainNumber(L.typed[i] || "");
+  return said === null ? null : said / c.factor;
 };
+// A number as it is typed, with a comma too, and nothing beside it: no unit is guessed.
+const plainNumber = (text) => {
+  const said = text.trim().replace(",", ".");
+  return said && Number.isFinite(+said) ? +said : null;
+};
+const metresOf = (text) => (plainNumber(text) === null ? null : plainNumber(text) / 100);
 // As it was typed, unless the mark was moved since.
 const shownField = (c, i) => {
   const at = L.mark ? L.mark[i] : null;
@@ -1044,20 +1050,30 @@ let C = null;
 let stream = null;
 let pictureUrl = "";
 let box = null;
+const inPicture = () => Boolean(L.view === "picture" && C && (C.picture || stream));
+// Whose picture counts: of the trial that is corrected, or that waits to be told; 0, the latest.
+const pictureOf = () => L.amending || numberOpen(S) || 0;
 async function fetchCamera() {
-  const answer = await get("/api/camera");
-  if (answer) seen(await answer.json());
+  if (!S) return;
+  const of = pictureOf();
+  const answer = await get(`/api/camera?trial=${of}`);
+  if (answer) seen(await answer.json(), of);
 }
 // A picture is shown, and may be touched, once it is there whole: before, no touch has a place in it.
-async function seen(camera) {
-  if (camera.picture && (camera.picture !== (C && C.picture) || !pictureUrl)) {
-    const answer = await get("/api/picture");
+async function seen(camera, of) {
+  if (of !== pictureOf()) { fetchCamera(); return; }
+  camera.for = of; // drawn only while that is still so
+  if (!camera.picture) {
+    [pictureUrl, box, L.calibrating] = ["", null, false];
+    $("picture").replaceChildren();
+  } else if (camera.picture !== (C && C.picture) || !pictureUrl) {
+    const answer = await get(`/api/picture?trial=${of}`);
     if (!answer) return;
     const url = URL.createObjectURL(await answer.blob());
     const image = h("img", { src: url });
     await image.decode();
     if (pictureUrl) URL.revokeObjectURL(pictureUrl);
-    [pictureUrl, L.wide, L.tall, box] = [url, image.naturalWidth, image.naturalHeight, null];
+    [pictureUrl, L.wide, L.tall, box, L.found] = [url, image.naturalWidth, image.naturalHeight, null, []];
   }
   C = camera;
   drawNews();
@@ -1139,14 +1155,15 @@ async function takePicture() {
   sendPicture(await new Promise((done) => canvas.toBlob(done, "image/jpeg", 0.95)));
 }
 async function sendPicture(blob) {
-  const camera = await send("/api/picture", "PUT", blob, "image/jpeg");
+  const of = pictureOf();
+  const camera = await send(`/api/picture?trial=${of}`, "PUT", blob, "image/jpeg");
   if (!camera) return;
   stopCamera();
   L.view = "picture";
-  seen(camera);
+  seen(camera, of);
 }
 async function findTags() {
-  const tags = await send("/api/tags", "GET");
+  const tags = await send(`/api/tags?trial=${pictureOf()}`, "GET");
   if (!tags) return;
   for (const [number, pixel] of Object.entries(tags)) if (number <= L.points.length) L.pixels[number - 1] = pixel;
   if (!Object.keys(tags).length) complain("no tag is seen in the picture");
@@ -1154,18 +1171,23 @@ async function findTags() {
 }
 async function calibrate() {
   const known = L.points.map((point, i) => [point, L.pixels[i]]).filter(([, pixel]) => pixel);
-  const camera = await send("/api/calibrate", "POST", JSON.stringify({ points: known.map(([point]) => point), pixels: known.map(([, pixel]) => pixel) }));
-  if (camera) { L.calibrating = false; seen(camera); }
+  const of = pictureOf();
+  const camera = await send("/api/calibrate", "POST", JSON.stringify({ points: known.map(([point]) => point), pixels: known.map(([, pixel]) => pixel), trial: of }));
+  if (camera) { L.calibrating = false; L.fitted = camera.doubts; seen(camera, of); }
 }
 async function find(by) {
-  const found = await send("/api/find", "POST", JSON.stringify({ words: L.what || "the orange ball", size: (L.size || 7) / 100, round: L.round !== false, by }));
-  if (!found) return;
-  box = found.box;
+  const size = metresOf(L.size ?? "7");
+  if (!(size > 0)) { complain(`its size "${L.size}" is no number of centimetres`); return; }
+  const of = pictureOf();
+  const found = await send("/api/find", "POST", JSON.stringify({ words: L.what || "the orange ball", size, round: L.round !== false, by, trial: of }));
+  if (!found || of !== pictureOf()) return;
+  [box, L.found] = [found.box, found.doubts];
   L.view = "picture";
   if (touching()) setMark(found.place, found.sd);
   else draw();
 }
 function drawCamera() {
+  if (C && C.for !== pictureOf()) { C = null; fetchCamera(); }
   if (!C || !mapped() || !current()) { fill("camera"); return; }
   const secure = window.isSecureContext && navigator.mediaDevices;
   const taking = h("div", { class: "row" },
@@ -1175,26 +1197,29 @@ function drawCamera() {
       onchange: (event) => event.target.files.length && sendPicture(event.target.files[0]) })));
   const parts = [h("h2", { id: "camera-title" }, "Camera"), h("p", {}, C.summary ? `${C.summary[0].toUpperCase()}${C.summary.slice(1)}.` : "Not calibrated: touch known points of the table in a picture once, then where the object landed in every other."),
     !secure && h("p", { class: "soft" }, "A browser gives its camera to https and to 127.0.0.1 only; here, choose a picture."), taking];
+  if (C.of && !pictureOf()) parts.push(h("p", { class: "soft" }, `This is the picture of ${C.of}.`));
+  for (const doubt of new Set([...(L.fitted || []), ...C.doubts, ...(L.found || [])])) parts.push(h("p", { class: "ask" }, `${doubt[0].toUpperCase()}${doubt.slice(1)}${doubt.endsWith("?") ? "" : "."}`));
   if (C.picture && !L.calibrating) {
-    parts.push(h("div", { class: "row" }, button("calibrate", C.to_table ? "Calibrate again" : "Calibrate", () => { L.calibrating = true; L.view = "picture"; L.points = C.points.map((p) => [...p]); L.pixels = []; L.at = 0; draw(); })));
+    parts.push(h("div", { class: "row" }, button("calibrate", C.to_table ? "Calibrate again" : "Calibrate", () => { L.calibrating = true; L.view = "picture"; L.points = C.points.map((p) => [...p]); L.texts = {}; L.pixels = []; L.at = 0; draw(); })));
     if (C.to_table) {
       parts.push(details("find", "Find the object in the picture",
         h("div", { class: "fields" }, h("label", {}, "What", h("input", { type: "text", id: "what", value: L.what || "the orange ball", oninput: (event) => { L.what = event.target.value; } })),
-          h("label", {}, "Its size [cm]", h("input", { type: "text", inputmode: "decimal", id: "size", value: L.size || 7, oninput: (event) => { L.size = parseFloat(event.target.value) || 7; } })),
+          h("label", {}, "Its size [cm]", h("input", { type: "text", inputmode: "decimal", id: "size", value: L.size ?? "7", oninput: (event) => { L.size = event.target.value; } })),
           h("label", {}, h("input", { type: "checkbox", id: "round", checked: L.round !== false, onchange: (event) => { L.round = event.target.checked; } }), " It is round")),
         h("div", { class: "row" }, button("colour", "By its colour", () => find("colour")), button("model", "By a model", () => find("model")))));
     }
   }
   if (L.calibrating) {
     const known = L.pixels.filter(Boolean).length;
+    const unread = L.points.findIndex((point, i) => L.pixels[i] && point.includes(null));
     parts.push(h("h3", {}, "Touch each known point in the picture"),
       h("ul", {}, L.points.map((point, i) => h("li", { class: "entry" },
         button(`point-${i}`, `Point ${i + 1}${L.pixels[i] ? " ✓" : ""}`, () => { L.at = i; draw(); }, "", { "aria-pressed": String(i === L.at) }),
-        h("span", { class: "fields" }, [0, 1].map((j) => h("label", {}, ["ahead [cm]", "left [cm]"][j], h("input", { type: "text", inputmode: "decimal", id: `known-${i}-${j}`, value: Math.round(point[j] * 1000) / 10,
-          onchange: (event) => { const value = parseFloat(event.target.value.replace(",", ".")); if (Number.isFinite(value)) L.points[i][j] = value / 100; } }))))))),
+        h("span", { class: "fields" }, [0, 1].map((j) => h("label", {}, ["ahead [cm]", "left [cm]"][j], h("input", { type: "text", inputmode: "decimal", id: `known-${i}-${j}`, value: L.texts[`${i}-${j}`] ?? Math.round(point[j] * 1000) / 10,
+          oninput: (event) => { point[j] = metresOf(L.texts[`${i}-${j}`] = event.target.value); draw(); } }))))))),
       h("div", { class: "row" }, button("more", "One more point", () => { L.points.push([0, 0]); L.at = L.points.length - 1; draw(); }), button("tags", "Find printed tags", findTags),
         h("a", { class: "button", href: "/tags.svg", target: "_blank", rel: "noopener" }, "Tags to print")),
-      button("fit", known < 4 ? `${4 - known} more points` : `Keep the calibration of ${known} points`, calibrate, "big", { disabled: known < 4 }),
+      button("fit", known < 4 ? `${4 - known} more points` : unread >= 0 ? `Point ${unread + 1} is no number of centimetres` : `Keep the calibration of ${known} points`, calibrate, "big", { disabled: known < 4 || unread >= 0 }),
       button("no-calibration", "Leave it as it is", () => { L.calibrating = false; draw(); }, "plain"));
   }
   fill("camera", parts);

@@ -82,8 +82,11 @@ class Endpoint:
 
 _STOP, _RECORDINGS = "/api/stop", "/api/recordings"
 _PLAN = "/api/plans/{number:int}"
-_PARAMETERS = {
-    int: {"type": "integer", "minimum": 0, "maximum": 2**31},
+_NUMBER = {"type": "integer", "minimum": 0, "maximum": 2**31}
+_OPTIONAL = int | None
+_PARAMETERS: dict[Any, dict[str, Any]] = {
+    int: _NUMBER,
+    _OPTIONAL: _NUMBER,
     str: {"type": "string", "minLength": 1, "maxLength": 600},
 }
 
@@ -156,9 +159,10 @@ async def _answer(endpoint: Endpoint, request: Request) -> Response:
     said, given = {**request.query_params, **request.path_params}, {}
     for name, kind in get_type_hints(endpoint.call).items():
         if kind in _PARAMETERS:
-            if name not in said:
+            if name in said:
+                given[name] = msgspec.convert(said[name], kind, strict=False)
+            elif kind != _OPTIONAL:
                 raise HTTPException(400, f"say {name}")
-            given[name] = said[name]
         elif name != "return":
             content = await _read(request, endpoint.largest)
             given[name] = content if kind is bytes else msgspec.json.decode(content, type=kind)
@@ -288,8 +292,8 @@ def openapi(table: list[Endpoint]) -> dict[str, Any]:
             "operationId": e.call.__name__,
             "responses": {"200": done, **refusals},
             "parameters": [
-                {"name": name, "in": "path" if f"{{{name}}}" in path else "query", "required": True}
-                | {"schema": _PARAMETERS[kind]}
+                {"name": name, "in": "path" if f"{{{name}}}" in path else "query"}
+                | {"required": kind != _OPTIONAL, "schema": _PARAMETERS[kind]}
                 for name, kind in takes.items()
                 if kind in _PARAMETERS
             ],
