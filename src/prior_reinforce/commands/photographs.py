@@ -236,16 +236,22 @@ class Look:
         beside = reading.goal_place - goal
         moved = float(np.linalg.norm(beside))
         says = f"{self.goal} is seen {100 * moved:.1f} cm from the goal that is set; "
+        # What this look wrote is there already; said again with each trial it would not be read.
         first = not [*drawn.parent.glob("*-seen.json")][1:]
         (u, v), (tall, wide) = here.to_pixels(reading.goal.place), reading.picture.shape[:2]
         flips = {"turned by half a turn": (wide - u, tall - v), "mirrored": (wide - u, v)}
         offset = reading.goal_place - reading.goal.place - goal
-        offs = {how: here.to_table(np.array(at)) + offset for how, at in flips.items()}
-        off, how = min((float(np.linalg.norm(off)), how) for how, off in offs.items())
+        offs = {
+            how: float(np.linalg.norm(here.to_table(np.array(at)) + offset))
+            for how, at in flips.items()
+        }
+        how = min(offs, key=offs.__getitem__)
+        off = offs[how]
         if first and off <= _SAME_GOAL >= moved:
+            alike = " or ".join(how for how in offs if offs[how] <= _SAME_GOAL)
             warn(
-                f"in the picture {how}, {self.goal} would be seen at the goal as well: look once "
-                f"whether left in the picture is left of the goal in {drawn}"
+                f"in the picture {alike}, {self.goal} would be seen at the goal as well: look once "
+                f"whether the picture in {drawn} is turned as that of the calibration"
             )
         if moved > _OTHER_GOAL and off <= min(max(_SAME_GOAL, 3 * here.sd), moved / 3):
             raise _refused(
