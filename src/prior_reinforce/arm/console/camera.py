@@ -152,12 +152,10 @@ class Pictures:
         )
         with named_disk_errors(self._verbs.folder):
             calibration.save(require_inside(self._verbs.folder / "camera.json", self._verbs.folder))
-        self._verbs.publish({"camera": "calibrated"})
         camera = self.look_up(body.trial)
-        camera.doubts = [
-            *doubts.of_calibration(calibration, body.points, body.pixels),
-            *camera.doubts,
-        ]
+        of_points = doubts.of_calibration(calibration, body.points, body.pixels)
+        camera.doubts = [*of_points, *camera.doubts]
+        self._verbs.publish({"camera": "calibrated"})  # last: a page hears it with the answer
         return camera
 
     def tags(self, trial: int | None = None) -> dict[int, list[float]]:
