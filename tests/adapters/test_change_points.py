@@ -4,7 +4,7 @@ import pytest
 from prior_reinforce.adapters.change_points import Change, split
 from prior_reinforce.adapters.memory import Places
 from prior_reinforce.readings import Reading
-from tests.adapters.test_bayesian import GOAL, after_two_hits, started
+from tests.adapters.test_bayesian import GOAL, after_two_hits
 
 OTHER = np.array([0.85, -0.1])
 
@@ -68,15 +68,6 @@ def test_later_trials_tell_a_moved_table_from_a_moved_goal(moved):
         (change,) = adapter._trials._histories[0].changes
         assert change.since == 2
         assert (change.goal is None) == all_moved
-
-
-@pytest.mark.slow
-def test_two_throws_that_came_down_alike_were_not_both_told_wrongly():
-    adapter, far = started(), Reading.measured([0.7, 0.5], 0.002)
-    for number in range(4):
-        adapter.observe(GOAL + 0.004 * number, GOAL, far)
-        wrong = [history.mistaken for history in adapter._trials._histories]
-        assert max(map(len, wrong)) <= 1
 
 
 @pytest.mark.slow

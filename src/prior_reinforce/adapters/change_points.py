@@ -26,8 +26,6 @@ from prior_reinforce.adapters.displacement import DisplacementPrior
 from prior_reinforce.adapters.expectation_propagation import Posterior, Readings, infer, tilted
 from prior_reinforce.adapters.memory import Memory, Places
 
-_ALIKE = 0.25
-"""Share of a displacement by which another is the same, from a condition as near (ours)."""
 _LEAST_ODDS = 1e-3
 """Histories less probable than this part of the most probable one are dropped (ours)."""
 _MOST = 6
@@ -185,8 +183,7 @@ def split(
 ) -> list[History]:
     """Return histories that may explain one more trial, before its reading is taken in.
 
-    `memory` is without it, `new` is that trial alone. It is not told wrongly as well where one that
-    was landed as far off from nearly the same condition: nobody slips twice alike.
+    `memory` is without it, `new` is that trial alone.
     """
     config, number, goal = prior.config, int(new.numbers[0]), new.goals[0]
     size = new.high - new.low
@@ -206,7 +203,7 @@ def split(
     with np.errstate(divide="ignore"):
         share = np.log([history.posterior.model_weights for history in histories])
     told = np.logaddexp.reduce(log_z[..., 0] + share[:, None], axis=2).sum(axis=-1)
-    wrong, same = float(np.log(config.p_mistaken) + flat), _alike(memory, new)
+    wrong = float(np.log(config.p_mistaken) + flat)
     ways: list[tuple[float, tuple[Change, ...]]] = [(nothing, ())]
     ways += [(p, (change,)) for p, change in happened]
     scored = []
@@ -214,17 +211,8 @@ def split(
         for (p, changes), log_p in zip(ways, under, strict=True):
             after = history.then(float(np.log(p)), *changes)
             scored.append((history.log_weight + np.log(p) + log_p, after))
-        if not (history.mistaken & same):
-            mistaken = replace(history.then(wrong), mistaken=history.mistaken | {number})
-            scored.append((history.log_weight + wrong, mistaken))
+        mistaken = replace(history.then(wrong), mistaken=history.mistaken | {number})
+        scored.append((history.log_weight + wrong, mistaken))
     scored.sort(key=lambda pair: -pair[0])
     least = scored[0][0] + np.log(_LEAST_ODDS)
     return [history for score, history in scored[:_MOST] if score > least]
-
-
-def _alike(memory: Memory, new: Memory) -> set[int]:
-    """Numbers of the trials that were displaced as one more is, from nearly the same condition."""
-    with np.errstate(invalid="ignore"):  # nan, and so not alike, where both ends are open
-        by, was = (0.5 * (trials.low + trials.high) for trials in (new, memory))
-        apart = np.linalg.norm(np.hstack([was - by, memory.conditions - new.conditions]), axis=1)
-        return set(memory.numbers[apart < _ALIKE * np.linalg.norm(by)].tolist())
