@@ -1,6 +1,7 @@
 """Commands on a workspace as a whole, as a person types them."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.plans.kinematics import tool_tip
 from tests.arm.robots.arms import UR, ur5e, write_urdf
 from tests.arm.robots.descriptions import J, Urdf, arm, fixed
+from tests.arm.workspace.planar import events_in
 
 
 @pytest.mark.slow
@@ -365,3 +367,32 @@ def test_motions_are_moved_in_metres_and_outcomes_in_another_unit_refused(run, t
     assert status == 2
     assert "write units m" in err
     assert run(*new)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("was", "now"),
+    [('units = ["m", "m"]', 'units = ["cm", "cm"]'), ('names = ["x", "y"]', 'names = ["y", "x"]')],
+)
+def test_no_command_takes_numbers_for_what_the_manifest_says_since_the_goal_was_set(
+    run, folder, was, now
+):
+    run("goal", folder, "0.9", "0.05")
+    run("ask", folder)
+    run("tell", folder, "5cm long")
+    run("ask", folder)
+    path, n = Path(folder, "workspace.toml"), len(events_in(folder))
+    text = path.read_text()
+    assert was in text
+    path.write_text(text.replace(was, now))
+    for command in (
+        ("status",), ("status", "--json"), ("trials",), ("report",), ("advise",), ("ask",),
+        ("goal", "0.9", "0.1"), ("tell", "2", "5cm long"), ("tell", "--outcome", "0.9", "0.1"),
+        ("amend", "1", "--outcome", "0.9", "0.1"), ("void", "2"), ("export", "2", "plan.npz"),
+    ):  # fmt: skip
+        status, out, err = run(command[0], folder, *command[1:])
+        assert (status, out) == (2, ""), command
+        assert "x [m], y [m]" in err
+        assert "put it back" in err
+    path.write_text(text)
+    assert len(events_in(folder)) == n
+    assert run("status", folder)[0] == 0

@@ -73,8 +73,8 @@ class Workspace:
             of another version; or the disk refuses.
         FileFormatError: A file that the journal names is missing, or not what was written; the
             manifest is no TOML; or a part of the workspace is a link out of it.
-        ConfigurationError: The manifest holds a wrong value, or has another number of outcomes than
-            the goals so far.
+        ConfigurationError: The manifest holds a wrong value, or has other names or units of
+            outcomes than the goals so far.
         InvalidDemonstrationsError: The manifest says otherwise since they were imported.
     """
 
@@ -153,11 +153,12 @@ class Workspace:
     @property
     def state(self) -> WorkspaceState:
         """What the journal adds up to."""
-        state, k = self.log.state(), self.manifest.outcome_format.outcome_dim
-        if state.goals and state.goals[0].goal.size != k:  # all goals have the same number
+        state, form = self.log.state(), self.manifest.outcome_format
+        known = state.goals[-1].format if state.goals else form
+        if (form.names, form.units) != (known.names, known.units):
             raise ConfigurationError(
-                f"{self.folder / MANIFEST_FILE} names {k} outcomes, but goals were set with "
-                f"{state.goals[0].goal.size}; put it back, or make another workspace"
+                f"{self.folder / MANIFEST_FILE} says that outcomes are {form}, but goals were set "
+                f"in {known}; put it back, or make another workspace"
             )
         return state
 
@@ -178,6 +179,7 @@ class Workspace:
 
     def session(self) -> Session:
         """The trials of this workspace. Telling needs no model; asking loads it."""
+        _ = self.state  # or refuse: a reading means the manifest's outcomes
         return Session(
             lambda: self.model,
             lambda: make_adapter(getattr(self.state.goal, "adapter", DEFAULT_ADAPTER)),
