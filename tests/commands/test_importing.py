@@ -119,6 +119,30 @@ def test_what_breaks_every_limit_is_not_learned_from_next(run, tmp_path, monkeyp
     assert out.endswith("next: prior-reinforce import arm recordings --no-trim --units deg\n")
 
 
+def test_what_is_refused_is_not_appended_so_the_remedy_leaves_no_twin(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    on_a_panda(run, tmp_path, 0.05, range(4))
+    for i in range(4):
+        with np.load(f"recordings/throw_{i}.npz") as was:
+            kept = dict(was)
+        kept["q"] = kept["q"] + [0, 0, 0, -1.5, 0, 1.5, 0]  # within joint4's range
+        kept["q"][:, 1] += 2e-4 * (-1.0) ** np.arange(24) * (i == 3)  # an encoder's noise
+        np.savez(f"recordings/throw_{i}.npz", **kept)
+    said = ("import", "arm", "recordings", "--time-unit", "ms", "--no-trim", "--append")
+    assert run(*said[:-1], "--leave-out", "throw_3")[0] == 0
+    status, out, err = run(*said, "--episodes", "throw_3")
+    assert status == 2
+    assert "no symmetry" not in out
+    assert "the gate refuses" in err
+    with Workspace("arm") as workspace:
+        assert workspace.demonstrations.n == 3
+    remedy = err.partition("run: prior-reinforce ")[2].split()
+    assert "--append" in remedy
+    assert run(*remedy)[0] == 0
+    with Workspace("arm") as workspace:
+        assert workspace.demonstrations.n == 4
+
+
 def test_or_agreed_to_at_a_terminal(run, folder, tmp_path, person):
     in_milliseconds_and_degrees(tmp_path / "odd")
     asked = person("no", "y", "yes").asked
@@ -218,6 +242,7 @@ def test_more_recordings_are_appended(run, folder, tmp_path):
     status, out, _ = run("import", folder, "more", "--append", "--no-trim")
     assert status == 0
     assert "4 demonstrations were there, now 6" in out
+    assert "of 6; nearest two are 0 and 1," in out
     with Workspace(folder) as workspace:
         after = workspace.demonstrations
     assert after.plans.shape == (6, 33, 2)

@@ -147,6 +147,12 @@ class Import(OnWorkspace):
                     raise InvalidDemonstrationsError("no episode is left; import again")
         result = recordings.demonstrations(selection, known, wanted)
         print_checked(result.preview.text)
+        remedy = result.preview.inspection.remedy
+        if remedy and self.append:  # kept, it would stay beside what the remedy makes of it
+            raise InvalidDemonstrationsError(
+                f"the gate refuses all of these, and nothing was appended; run: "
+                f"{self._command(remedy)}"
+            )
         n_before = workspace.take_in(result, str(recordings.source), append=self.append)
         if n_before:
             n = n_before + result.demonstrations.n
@@ -157,7 +163,7 @@ class Import(OnWorkspace):
             )
         except WorkspaceError as error:  # the demonstrations are taken in without it
             warn(f"no picture: {error}")
-        if remedy := result.preview.inspection.remedy:
+        if remedy:
             print(f"next: {self._command(remedy)}")
         else:
             print_next(workspace)

@@ -7,14 +7,17 @@ import os
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from prior_reinforce.arm.recordings.appending import appended
 from prior_reinforce.arm.recordings.fit import slips
 from prior_reinforce.arm.recordings.inspection import Inspection, in_rows, say_small
+from prior_reinforce.arm.recordings.takes import so_far
 from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.errors import WorkspaceError
 from prior_reinforce.files import named_disk_errors
@@ -53,7 +56,7 @@ class Preview:
     inspection: Inspection
     """The N recordings, and what became of them."""
     demonstrations: Demonstrations
-    """The result."""
+    """The result; appended, the new ones alone."""
     outcomes_from: str
     """Where the outcomes are from."""
 
@@ -62,13 +65,24 @@ class Preview:
         """Names of the recordings."""
         return self.inspection.selection.episodes
 
+    @cached_property
+    def _whole(self) -> Demonstrations:
+        """All that will be learned from: those in use as well, where these are appended."""
+        before, more = self.inspection.wanted.before, self.demonstrations
+        return more if before is None else appended(before, more, self.episodes)
+
+    @property
+    def _names(self) -> list[str]:
+        """What to call them."""
+        return [*so_far(self._whole.n - self.demonstrations.n), *self.episodes]
+
     @property
     def remarks(self) -> tuple[str, ...]:
         """Warnings: those of the inspection, and outcomes that occur twice or look swapped."""
         alike = tuple(
-            f"{self.episodes[i]} and {self.episodes[j]} have the same outcome: the mean of both "
+            f"{self._names[i]} and {self._names[j]} have the same outcome: the mean of both "
             "motions stands for it; if that is a slip of the pen, correct it"
-            for i, j in self.demonstrations.repeated_outcomes()
+            for i, j in self._whole.repeated_outcomes()
         )
         doubted = tuple(
             f"{slip.what}: put right, the motions tell outcomes {slip.better:.1f} times better; "
@@ -183,7 +197,7 @@ class Preview:
         return picture
 
     def _coverage(self) -> str:
-        demos, points = self.demonstrations, self.demonstrations.outcomes_seen
+        demos, points = self._whole, self._whole.outcomes_seen
         if demos.n == 1:
             if demos.symmetry is None:
                 return "one outcome, and no symmetry is declared: no other goal can be reached"
@@ -193,7 +207,7 @@ class Preview:
         i, j = np.unravel_index(int(np.argmin(gaps)), gaps.shape)
         units = demos.outcome_format.units
         one_unit = f" {units[0]}" * (len(set(units)) == 1)
-        pair = f"{self.episodes[i]} and {self.episodes[j]}"
+        pair = f"{self._names[i]} and {self._names[j]}"
         nearest = f"nearest two are {pair}, {gaps[i, j]:.3g}{one_unit} apart"
         if demos.outcome_dim == 1:
             return nearest
