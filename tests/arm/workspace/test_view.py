@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -15,6 +16,7 @@ from prior_reinforce.arm.workspace.view import (
     StatusView,
     TrialView,
 )
+from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.commands import advice
 from tests.arm.workspace.planar import recordings
 
@@ -58,7 +60,7 @@ def test_the_schema_is_stable():
     assert {"trial", "gate", "first_pose", "execution"} < fields["AskView"]
     assert {n: len(f) for n, f in fields.items()} == {
         "StatusView": 23,
-        "GoalView": 8,
+        "GoalView": 9,
         "TrialView": 23,
         "AskView": 6,
         "AdviceView": 11,
@@ -99,6 +101,24 @@ def test_status_has_all_goals(run, afternoon):
     assert status["text"] + "\n" == text
     assert "goal 1          90 cm ahead, 5 cm left: reached in 3 trials" in text
     assert "goal 2          100 cm ahead, 5 cm right: not reached yet" in text
+
+
+def test_what_a_goal_cost_stays_what_its_own_model_learned_from(run, folder):
+    run("goal", folder, "0.9", "0.05")
+    run("ask", folder)
+    run("tell", folder, "hit")
+    with Workspace(folder) as workspace:
+        shown = workspace.demonstrations
+        workspace.import_demonstrations(shown.only([0, 1, 2]), "three of them")
+        workspace.learn("interpolation")
+    assert "N = 4 demonstrations + 1 trial = 5" in run("status", folder)[1]
+    run("goal", folder, "0.9", "0.1")
+    run("ask", folder)
+    run("tell", folder, "hit")
+    goals = json.loads(run("status", folder, "--json")[1])["goals"]
+    assert [goal["demonstrations"] for goal in goals] == [4, 3]
+    page = Path(run("report", folder)[1].split()[-1]).read_text()
+    assert "4, 3" in page
 
 
 def test_the_table_has_a_column_for_each_number(run, afternoon):

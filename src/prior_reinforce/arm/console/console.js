@@ -835,7 +835,7 @@ const old = (trial) => trial.outdated && h("p", { class: "ask" }, "Planned befor
 function goalPanel(off) {
   const goal = goalNow();
   return [
-    S.step === "reached" && h("p", { class: "chance hit" }, `Goal ${goal.number} is reached: N = ${count(S.shown.length, "demonstration")} + ${count(goal.reached_after, "trial")} = ${S.shown.length + goal.reached_after}.`),
+    S.step === "reached" && h("p", { class: "chance hit" }, `Goal ${goal.number} is reached: N = ${count(goal.demonstrations, "demonstration")} + ${count(goal.reached_after, "trial")} = ${goal.demonstrations + goal.reached_after}.`),
     button("goal", marked() ? `Aim at ${sayPlace(L.mark)}` : S.step === "reached" && !L.mark ? "Touch the next goal" : touchFirst("it should land"),
       () => setGoal({ goal: L.mark, new_hardware: L.changed || null }), "big", { disabled: !marked() || off.disabled }),
     S.step === "reached" && h("div", { class: "row" }, button("again", "Throw at it once more", () => verb("ask"), "", off)),

@@ -55,7 +55,7 @@ def report_workspace(
     facts = {
         "Task": manifest.name,
         "Trials made": " to ".join(dict.fromkeys((dates[0], dates[-1]))),
-        "Demonstrations": str(records[-1].demonstrations.n),
+        "Demonstrations": ", ".join(dict.fromkeys(str(each.demonstrations.n) for each in records)),
         "Model": ", ".join(_say_model(state, model) for model in dict.fromkeys(models)),
         "Adapter": ", ".join(dict.fromkeys(goal.adapter for goal in goals)),
         "Robot": "none, no limits checked" if robot is None else robot.robot,
@@ -112,9 +112,10 @@ def _record(
             trial = replace(trial, plan=plan)
         trials.append(trial)
     views = [trial_view(now, trial) for trial in trials]
-    training = now.state.trainings[trials[-1].model]
+    learned_from = now.state.shown_for(goal)
+    assert learned_from is not None  # it has trials
     return AdaptationRecord(
-        demonstrations=shown(training.demonstrations_sha256),
+        demonstrations=shown(learned_from.sha256),
         goal=goal.goal,
         tolerance=goal.tolerance,
         trials=tuple(trials),

@@ -28,7 +28,7 @@ from prior_reinforce.arm.workspace.manifest import Manifest
 from prior_reinforce.arm.workspace.store import Store
 from prior_reinforce.errors import WorkspaceError
 from prior_reinforce.session.events import Event, GoalSet
-from prior_reinforce.session.trials import SessionState, Trial
+from prior_reinforce.session.trials import Goal, SessionState, Trial
 
 Stage = Literal["asked", "executing", "executed", "told", "voided"]
 """Where a trial of a workspace stands. `executing`: a command was given the plan; if the program
@@ -45,8 +45,8 @@ class WorkspaceState(SessionState):
 
     def __init__(self) -> None:
         super().__init__()
-        self.demonstrations: DemonstrationsImported | None = None
-        """The latest import; None before the first."""
+        self.imports: dict[str, DemonstrationsImported] = {}
+        """The latest import of all demonstrations by their hash; the last is in use."""
         self.trainings: dict[str, ModelTrained] = {}
         """The latest training of every model by its hash; the last is in use."""
         self.plan_files: dict[int, KeptPlan] = {}
@@ -57,6 +57,19 @@ class WorkspaceState(SessionState):
         """The latest event of each trial that the arm moved for, executed or not."""
         self.cut_off: dict[int, Motion] = {}
         """Which motion before each trial was not made to its end, as far as anybody knows."""
+
+    @property
+    def demonstrations(self) -> DemonstrationsImported | None:
+        """The latest import; None before the first."""
+        return next(reversed(self.imports.values()), None)
+
+    def shown_for(self, goal: Goal) -> DemonstrationsImported | None:
+        """What the model learned from that reached a goal, or was tried last; else the latest."""
+        trials = self.trials_of(goal.number)
+        last = next((trial for trial in trials if trial.hit), trials[-1] if trials else None)
+        if last is None:
+            return self.demonstrations
+        return self.imports[self.trainings[last.model].demonstrations_sha256]
 
     @property
     def training(self) -> ModelTrained | None:
@@ -92,7 +105,8 @@ class WorkspaceState(SessionState):
             case GoalSet(adapter=""):  # by a session in Python, which makes it by default
                 super()._apply(structs.replace(event, adapter=DEFAULT_ADAPTER), time)
             case DemonstrationsImported():
-                self.demonstrations = event
+                self.imports.pop(event.sha256, None)
+                self.imports[event.sha256] = event
             case ModelTrained():
                 self.trainings.pop(event.model, None)  # learned again, it becomes the last
                 self.trainings[event.model] = event

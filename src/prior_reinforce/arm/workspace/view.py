@@ -15,11 +15,11 @@ import numpy as np
 from msgspec import Struct, structs
 
 from prior_reinforce.arm.workspace.manifest import UNKNOWN
-from prior_reinforce.arm.workspace.state import Standing, Step
+from prior_reinforce.arm.workspace.state import Standing, Step, WorkspaceState
 from prior_reinforce.arm.workspace.text import goal_step, next_step, say_trial, say_warning
 from prior_reinforce.files import as_cell
 from prior_reinforce.formats import OutcomeFormat
-from prior_reinforce.session.trials import Goal, SessionState, Trial, told_of, trials_to_hit
+from prior_reinforce.session.trials import Goal, Trial, told_of, trials_to_hit
 from prior_reinforce.terminal import plain
 from prior_reinforce.wording import (
     as_html,
@@ -56,6 +56,8 @@ class GoalView(View, frozen=True):
     """Trials told, voided ones not counted."""
     reached_after: int | None
     """Trials until it was reached; null where it was not."""
+    demonstrations: int
+    """Number of those that its model learned from."""
 
 
 class TrialView(View, frozen=True):
@@ -292,7 +294,7 @@ def status_view(now: Standing) -> StatusView:
     return structs.replace(view, text=describe(view))
 
 
-def _goal_view(state: SessionState, goal: Goal) -> GoalView:
+def _goal_view(state: WorkspaceState, goal: Goal) -> GoalView:
     trials = state.trials_of(goal.number)
     return GoalView(
         number=goal.number,
@@ -303,6 +305,7 @@ def _goal_view(state: SessionState, goal: Goal) -> GoalView:
         new_hardware=goal.new_hardware,
         told=len(told_of(trials)),
         reached_after=trials_to_hit(trials),
+        demonstrations=0 if (shown := state.shown_for(goal)) is None else shown.n,
     )
 
 
@@ -334,9 +337,9 @@ def describe(view: StatusView) -> str:
 
 def _say_goal(view: StatusView, goal: GoalView) -> str:
     place = say_place(goal.goal, view.outcome_format)
-    n, hits = view.demonstrations, goal.reached_after
-    if hits is not None:
-        return f"{place}: reached in {say_count(hits, 'trial')} ({say_cost(n, hits)})"
+    if (hits := goal.reached_after) is not None:
+        cost = say_cost(goal.demonstrations, hits)
+        return f"{place}: reached in {say_count(hits, 'trial')} ({cost})"
     if goal.number < len(view.goals):
         if not goal.told:
             return f"{place}: not tried"
