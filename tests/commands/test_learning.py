@@ -73,3 +73,21 @@ def test_another_generator_can_be_learned(run, folder):
         assert status == 2
         assert remedy in err
     assert events_in(folder) == before
+
+
+def test_trials_of_an_earlier_model_are_said_to_teach_nothing_wherever_it_matters(run, folder):
+    run("goal", folder, "0.9", "0.05")
+    for _ in range(2):
+        run("ask", folder)
+        run("tell", folder, "5cm long, 2cm left")
+    left_out = "2 trials of other models teach this one nothing"
+    assert left_out not in run("learn", folder, "--generator", "interpolation")[1]  # the same
+    outs = [run("learn", folder, "--generator", "interpolation,timing=none")[1]]
+    outs += [run(*said)[1] for said in (("status", folder), ("ask", folder))]
+    outs += [run("amend", folder, 1, "4cm long")[1]]
+    for out in outs:
+        assert left_out in out
+    assert run("goal", folder, "0.9", "0.1")[0] == 2
+    run("void", folder)
+    run("goal", folder, "0.9", "0.1", "--memory", "goal")
+    assert left_out not in run("status", folder)[1]

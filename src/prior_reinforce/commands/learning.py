@@ -8,6 +8,7 @@ from typing import Annotated
 import tyro
 from rich.console import Console
 
+from prior_reinforce.arm.workspace.text import say_left_out
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.commands.base import OnWorkspace, print_next
 from prior_reinforce.commands.live import fit_progress
@@ -48,7 +49,6 @@ class Learn(OnWorkspace):
             learned = workspace.learn(
                 self.choice, seed=self.seed, device=self.device, progress=progress
             )
-        for remark in learned.remarks:
-            print(remark)
-        print(f"model {learned.model} is in use")
+        model = f"model {learned.model} is in use"
+        print(*learned.remarks, model, *say_left_out(workspace.state), sep="\n")
         print_next(workspace)

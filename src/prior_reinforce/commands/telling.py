@@ -13,6 +13,7 @@ from prior_reinforce.arm.workspace.text import (
     call,
     execution_warning,
     next_step,
+    say_left_out,
     say_outdated,
     say_trial,
     tell_example,
@@ -112,7 +113,9 @@ class Amend(Seen):
         trial = workspace.session().amend(number, seen, hit=hit)
         now = workspace.standing
         print(f"trial {trial.number}, corrected: {_say_told(now, trial, self.error or words)}")
-        print(*say_outdated(now.state), f"next: {next_step(now)}", sep="\n")
+        print(
+            *say_outdated(now.state), *say_left_out(now.state), f"next: {next_step(now)}", sep="\n"
+        )
 
 
 @dataclass(frozen=True)

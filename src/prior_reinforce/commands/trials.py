@@ -27,10 +27,12 @@ from prior_reinforce.arm.workspace.execute import (
     say_look,
     to_execute,
 )
+from prior_reinforce.arm.workspace.state import WorkspaceState
 from prior_reinforce.arm.workspace.text import (
     execution_warning,
     next_step,
     say_expectation,
+    say_left_out,
     say_outdated,
     say_trial,
 )
@@ -256,7 +258,7 @@ class Ask(OnWorkspace):
             )
 
     def _show(
-        self, workspace: Workspace, state: SessionState, trial: Trial, reached_before: bool
+        self, workspace: Workspace, state: WorkspaceState, trial: Trial, reached_before: bool
     ) -> None:
         """Print where the trial aims and what the gate says, and write --out."""
         manifest = workspace.manifest
@@ -266,7 +268,8 @@ class Ask(OnWorkspace):
         if beside and beside != to_words(0.0 * goal, outcome):
             aims += f" ({beside} of the goal, so that it lands there)"
         print(aims)
-        for line in (*say_expectation(workspace.standing, trial), *say_outdated(state)):
+        expected = say_expectation(workspace.standing, trial)
+        for line in (*expected, *say_left_out(state), *say_outdated(state)):
             print(line)
         if reached_before:
             print("the goal is reached already: this trial repeats it")

@@ -314,18 +314,20 @@ class Demonstrations:
         Raises:
             InvalidGoalError: Wrong shape, or not finite.
         """
-        goal = as_goal(goal, self.outcome_format.names)
-        beyond = self.far_outside(goal)
-        if np.any(beyond):
-            form, near = self.outcome_format, self.nearest_inside(goal)
-            where = f"outside what was demonstrated; the nearest inside is {say_place(near, form)}"
-            if self.symmetry is not None:
-                where = f"from where motions can be moved ({self.symmetry.name})"
-            warn_caller(
-                f"goal {say_place(goal, form)} lies {say_beyond(beyond, form)} {where}; check its "
-                "unit, or demonstrate nearer to it"
-            )
-        return goal
+        place = as_goal(goal, self.outcome_format.names)
+        if far := self.say_far_outside(place):
+            warn_caller(far)
+        return place
+
+    def say_far_outside(self, goal: Point) -> str:
+        """Say how far a goal lies outside the outcomes; empty where it is near enough."""
+        form, beyond = self.outcome_format, self.far_outside(goal)
+        near = say_place(self.nearest_inside(goal), form)
+        where = f"outside what was demonstrated; the nearest inside is {near}"
+        if self.symmetry is not None:
+            where = f"from where motions can be moved ({self.symmetry.name})"
+        said = f"goal {say_place(goal, form)} lies {say_beyond(beyond, form)} {where}"
+        return f"{said}; check its unit, or demonstrate nearer to it" if np.any(beyond) else ""
 
     def nearest_inside(self, goal: Point) -> Point:
         """Return the place nearest to a goal whose components all lie between demonstrated ones."""

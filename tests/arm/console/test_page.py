@@ -740,6 +740,22 @@ def test_a_bare_hit_is_said_once_and_a_goal_that_was_given_up_is_not_on_the_map(
     expect(page.locator("#map path.goal")).to_have_count(2)  # that of now, and that was thrown at
 
 
+@pytest.mark.filterwarnings("ignore:goal 500 cm ahead")
+def test_a_mistyped_goal_is_said_on_the_page_and_scales_the_map_only_while_it_stands(at, serve):
+    served = serve()
+    with Workspace(served.folder) as workspace:
+        workspace.set_goal([0.9, 0.05])
+        page = at(served)
+        shown = page.get_attribute("#map", "viewBox")
+        for _ in range(2):  # each time, and where it is seen
+            workspace.set_goal([5.0, 5.0])
+            expect(page.locator("#far")).to_contain_text("check its unit")
+            assert page.get_attribute("#map", "viewBox") != shown
+            workspace.set_goal([0.9, 0.05])
+            expect(page.locator("#far")).to_have_count(0)
+            assert page.get_attribute("#map", "viewBox") == shown
+
+
 def test_words_by_eye_then_a_correction_and_a_void(at, serve, tmp_path):
     served, page = executed(at, serve)
     page.locator("#eye-0-5").check(force=True)

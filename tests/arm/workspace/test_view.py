@@ -59,7 +59,7 @@ def test_the_schema_is_stable():
     assert {"task", "goals", "open_trial", "solved", "stale", "next"} < fields["StatusView"]
     assert {"trial", "gate", "first_pose", "execution"} < fields["AskView"]
     assert {n: len(f) for n, f in fields.items()} == {
-        "StatusView": 23,
+        "StatusView": 24,
         "GoalView": 9,
         "TrialView": 23,
         "AskView": 6,

@@ -547,10 +547,10 @@ function drawBar() {
     button("nearer", "+", () => { L.zoom = Math.min(8, L.zoom ? L.zoom * 2 : 1); draw(); }, "", { "aria-label": "Nearer", disabled: L.zoom >= 8 }),
     button("farther", "−", () => { L.zoom = L.zoom > 1 ? L.zoom / 2 : 0; draw(); }, "", { "aria-label": "Farther", disabled: L.zoom === 0 }));
 }
-// All outcomes that have to be seen now.
+// All outcomes that have to be seen now; a goal that was mistyped and corrected is none of them.
 const shownOutcomes = () => [
   ...shownDemonstrations().map(({ outcome }) => outcome),
-  ...S.goals.map(({ goal }) => goal),
+  ...[goalNow(), touchedGoal()].filter(Boolean).map(({ goal }) => goal),
   ...S.trials.filter((trial) => trial.outcome && (trial.goal === S.goals.length || trial.number === L.amending)).map(({ outcome }) => outcome),
 ];
 
@@ -787,7 +787,8 @@ function drawAct() {
         button("still", "Nothing moved", () => verb("ask", { arm_did_not_move: true }))));
   }
   $("act").classList.toggle("tall", S.step === "import" && !L.episode);
-  fill("act", h("h2", { class: "unseen" }, "What to do"), ...parts);
+  const far = current() && S.far && S.step !== "reached" && h("p", { class: "ask", id: "far" }, `${S.far}.`);
+  fill("act", h("h2", { class: "unseen" }, "What to do"), far, ...parts);
 }
 // Before an arm moves, it is asked where it stands, and a person is asked what the command line asks.
 async function askToMove(motion, speed = 1) {
@@ -924,7 +925,7 @@ function drawHistory() {
     const first = i === 0 || list[i - 1].goal !== trial.goal;
     return [first && h("li", { class: "soft" }, `Goal ${trial.goal}: ${sayPlace(goalOf(trial).goal)}${goalOf(trial).new_hardware ? ` (changed: ${goalOf(trial).new_hardware})` : ""}`), row(trial)];
   });
-  fill("history", h("h2", { id: "history-title" }, "What happened"), h("ul", {}, goals(trials.slice(0, SHOWN))),
+  fill("history", h("h2", { id: "history-title" }, "What happened"), S.left_out && h("p", { class: "soft" }, `${S.left_out}.`), h("ul", {}, goals(trials.slice(0, SHOWN))),
     trials.length > SHOWN && (L.open.all ? h("ul", {}, goals(trials.slice(SHOWN))) : button("all", `${trials.length - SHOWN} earlier trials`, () => { L.open.all = true; draw(); }, "plain")),
     S.report && h("p", {}, h("a", { href: S.report, target: "_blank", rel: "noopener" }, "The report: every goal, trial and plan")));
 }

@@ -56,6 +56,8 @@ class ConsoleState(StatusView, frozen=True, kw_only=True):
     components: list[Component]
     shown: list[list[float]]
     """Where each demonstration's object ended."""
+    far: str
+    """How far the goal lies outside what was demonstrated; empty where it is near enough."""
     output: str
     """The end of what the motion of the trial that waits wrote."""
     moved_by: Mover = ""
@@ -72,15 +74,18 @@ def state_of(workspace: Workspace) -> ConsoleState:
 
     FileFormatError if the demonstrations are damaged; else as `Workspace.state`.
     """
-    now, entries, shown = workspace.standing, workspace.events, np.empty((0, 0))
+    now, entries, shown, far = workspace.standing, workspace.events, np.empty((0, 0)), ""
     if now.state.demonstrations is not None:
         shown = workspace.demonstrations.outcomes_seen
+        if now.state.goal is not None:
+            far = workspace.demonstrations.say_far_outside(now.state.goal.goal)
     return ConsoleState(
         **structs.asdict(status_view(now)),
         id=entries[-1].id if entries else 0,
         stopped=str(last_stop(workspace.folder)),
         components=components_of(workspace.manifest),
         shown=shown.tolist(),
+        far=far,
         output=output_of(workspace, now.state),
     )
 

@@ -10,7 +10,7 @@ from typing import Literal
 from prior_reinforce.arm.executing.lock import programs_executing
 from prior_reinforce.arm.workspace.events import Moved, Moving
 from prior_reinforce.arm.workspace.manifest import Manifest, workspace_around
-from prior_reinforce.arm.workspace.state import Standing
+from prior_reinforce.arm.workspace.state import Standing, WorkspaceState
 from prior_reinforce.errors import TrialStateError
 from prior_reinforce.session.trials import SessionState, Trial, told_of
 from prior_reinforce.terminal import plain
@@ -95,6 +95,15 @@ def say_outdated(state: SessionState) -> list[str]:
     """Say so where the trial that waits was planned before a correction."""
     trial = state.open_trial
     return [f"trial {trial.number} was {_OUTDATED}"] if trial and trial.outdated else []
+
+
+def say_left_out(state: WorkspaceState) -> list[str]:
+    """Say how many trials would teach for the goal of now, had this model planned them."""
+    goal, model = state.goal, state.in_use[0]
+    trials = state.trials if goal is not None and goal.carry_over else state.current
+    n = sum(trial.model != model for trial in told_of(trials))
+    planned = "a trial of another model teaches" if n == 1 else f"{n} trials of other models teach"
+    return [f"{planned} this one nothing"] if n else []
 
 
 def say_warning(now: Standing, trial: Trial) -> str:

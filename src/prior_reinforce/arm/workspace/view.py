@@ -16,7 +16,13 @@ from msgspec import Struct, structs
 
 from prior_reinforce.arm.workspace.manifest import UNKNOWN
 from prior_reinforce.arm.workspace.state import Standing, Step, WorkspaceState
-from prior_reinforce.arm.workspace.text import goal_step, next_step, say_trial, say_warning
+from prior_reinforce.arm.workspace.text import (
+    goal_step,
+    next_step,
+    say_left_out,
+    say_trial,
+    say_warning,
+)
 from prior_reinforce.files import as_cell
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.session.trials import Goal, Trial, told_of, trials_to_hit
@@ -138,6 +144,8 @@ class StatusView(View, frozen=True):
     goals: list[GoalView]
     trials: list[TrialView]
     """All of them, of all goals."""
+    left_out: str | None
+    """How many of them teach the model in use nothing, as others planned them; null if none."""
     solved: bool
     """Whether the latest goal is reached."""
     open_trial: TrialView | None
@@ -285,6 +293,7 @@ def status_view(now: Standing) -> StatusView:
         stale=state.stale,
         goals=[_goal_view(state, goal) for goal in state.goals],
         trials=trials,
+        left_out="; ".join(say_left_out(state)) or None,
         solved=state.solved,
         open_trial=trials[-1] if state.open_trial is not None else None,
         step=now.step,
@@ -330,6 +339,7 @@ def describe(view: StatusView) -> str:
     if earlier := len(current) - len(shown):
         rows.append((f"  {earlier} more", "before these; all are in the report"))
     rows += [(f"  trial {trial.number}", trial.line) for trial in shown]
+    rows += [("  note", view.left_out)] if view.left_out else []
     refused = "" if view.nearer is None else f"; if it refuses, {view.nearer}"
     rows.append(("next", view.next + refused))
     return "\n".join(plain(f"{name:<15} {text}") for name, text in rows)
