@@ -27,6 +27,16 @@ def test_advice_names_places_and_draws_the_region(run, folder, monkeypatch):
     assert events_in(folder) == before
 
 
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:goal 90 cm behind")
+def test_of_a_goal_far_off_advice_says_so_and_is_drawn_whole(run, folder, monkeypatch):
+    monkeypatch.setattr(advice, "_ACROSS", 6)
+    run("goal", folder, "-0.9", "0.1")
+    status, out, err = run("advise", folder)  # what cannot be laid out is warned of
+    assert (status, err) == (0, "")
+    assert "170 cm in x outside what was demonstrated" in out
+
+
 def test_advice_needs_an_adapter_that_knows_probabilities(run, folder):
     run("goal", folder, "0.9", "0.05", "--adapter", "gp")
     status, out, err = run("advise", folder)

@@ -57,3 +57,17 @@ def test_what_the_shades_and_the_axes_mean_is_said(tmp_path, figures):
     sizes = {scatter.get_label(): scatter.get_sizes()[0] for scatter in axes.collections[1:]}
     # Both are seen where they are at one place.
     assert sizes["throw that teaches most"] > 4 * sizes["demonstration that teaches most"]
+
+
+@pytest.mark.parametrize("goal", [[-0.9, 0.1], [2.5, 0.0], [0.9, -0.4]])
+def test_a_goal_off_the_map_stands_at_its_edge_and_is_named_so(tmp_path, figures, goal):
+    grid = np.stack(np.meshgrid([0.8, 0.9, 1.0], [-0.2, 0.2], indexing="ij"), -1).reshape(-1, 2)
+    draw_advice(
+        tmp_path / "a.png", OutcomeFormat.metres(2), grid[:2], goals=grid,
+        p_hit=np.full(6, 0.5), goal=np.array(goal),
+    )  # fmt: skip
+    (axes,) = figures[0].axes
+    (mark,) = (line for line in axes.lines if line.get_label() == "goal, off the map")
+    x, y = mark.get_xydata()[0] / 100
+    assert -0.2 <= x <= 0.2
+    assert 0.8 <= y <= 1.0

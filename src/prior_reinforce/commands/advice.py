@@ -108,9 +108,11 @@ class Advise(OnWorkspace):
             )
             print_json(record)
             return
-        where = "region around what was shown" if declared else "demonstrated region"
+        if far := session.demonstrations.say_far_outside(session.goal):
+            print(far)
         print(
-            f"in the {where} a first throw's hit is likeliest at {say_place(goals[best], form)} "
+            "in the region around what was shown "
+            f"a first throw's hit is likeliest at {say_place(goals[best], form)} "
             f"({say_chance(p[best])}), least likely at {say_place(goals[worst], form)} "
             f"({say_chance(p[worst])})"
         )

@@ -79,9 +79,10 @@ def draw_advice(
             edgecolors=style.INK, linewidths=0.8, label=label, zorder=3, clip_on=False,
         )  # fmt: skip
     if goal is not None:
-        place = scale * goal
+        place = np.clip(scale * goal, [x[0], y[0]], [x[-1], y[-1]])
+        label = "goal" if np.allclose(place, scale * goal) else "goal, off the map"
         cross: Any = {"color": style.GOAL, "ms": 11, "mew": 2.2, "zorder": 4, "clip_on": False}
-        axes.plot(place[1], place[0], "+", label="goal", **cross)
+        axes.plot(place[1], place[0], "+", label=label, **cross)
     axes.invert_xaxis()
     axes.set_xlabel(axis_label(form, 1, mirrored=True))
     axes.set_ylabel(axis_label(form, 0))

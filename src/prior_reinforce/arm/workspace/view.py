@@ -209,7 +209,7 @@ class AdviceView(View, frozen=True):
     """Where first throws would hit, and what would teach most."""
 
     mean_p_hit: float
-    """Over the demonstrated region."""
+    """Over the region around what was demonstrated."""
     best: list[float]
     """Where a first throw hits most probably."""
     best_p_hit: float
