@@ -76,6 +76,7 @@ def test_every_refusal_is_named():
         report(FAST, broken).require()
     restless = LimitLine(check="rest at start", status="refuse", text="joint1 at 0.059 rad/s")
     for lines, said in (((FAST,), False), ((FAST, restless), True)):
-        with pytest.raises(RobotLimitError, match="--smooth 20 or less") as refused:
+        match = "learn with another --generator.*--smooth 20 or less"
+        with pytest.raises(RobotLimitError, match=match) as refused:
             report(*lines).require()
         assert ("--no-trim" in str(refused.value)) is said

@@ -59,7 +59,7 @@ def test_the_schema_is_stable():
     assert {"task", "goals", "open_trial", "solved", "stale", "next"} < fields["StatusView"]
     assert {"trial", "gate", "first_pose", "execution"} < fields["AskView"]
     assert {n: len(f) for n, f in fields.items()} == {
-        "StatusView": 24,
+        "StatusView": 25,
         "GoalView": 9,
         "TrialView": 23,
         "AskView": 6,
@@ -119,6 +119,36 @@ def test_what_a_goal_cost_stays_what_its_own_model_learned_from(run, folder):
     assert [goal["demonstrations"] for goal in goals] == [4, 3]
     page = Path(run("report", folder)[1].split()[-1]).read_text()
     assert "4, 3" in page
+
+
+def test_demonstrations_that_are_gone_are_named_everywhere_with_what_brings_them_back(
+    run, folder, tmp_path
+):
+    run("goal", folder, "0.9", "0.05")
+    (path,) = Path(folder, "demonstrations").iterdir()
+    content, remedy = path.read_bytes(), f"prior-reinforce import {folder} RECORDINGS"
+    for left, what in ((None, "is missing"), (content[:100], "is not what was imported")):
+        path.unlink() if left is None else path.write_bytes(left)
+        status, out, _ = run("status", folder)
+        assert status == 0
+        assert f"{path} {what}" in out
+        assert remedy in out
+        for command in ("ask", "learn"):
+            status, _, err = run(command, folder)
+            assert status == 2
+            assert remedy in err
+
+
+def test_a_goal_that_keeps_a_tolerance_of_before_says_so(run, folder):
+    run("goal", folder, "0.9", "0.05")
+    assert "within" not in run("status", folder)[1]
+    manifest = Path(folder, "workspace.toml")
+    manifest.write_text(manifest.read_text().replace("tolerance = 0.015", "tolerance = 0.05"))
+    run("goal", folder, "0.9", "0.1")
+    out = run("status", folder)[1]
+    assert "tolerance 5 cm" in out
+    assert "goal 1          90 cm ahead, 5 cm left, within 1.5 cm as it was set: not tried" in out
+    assert "goal 2          90 cm ahead, 10 cm left: not reached yet" in out
 
 
 def test_the_table_has_a_column_for_each_number(run, afternoon):

@@ -159,8 +159,9 @@ class LimitReport:
             moves_on = "rest at " in self.refusals
             raise RobotLimitError(
                 f"plan refused for {self.robot}: {self.refusals}",
-                remedy="plans are never clipped or slowed down: choose another goal or "
-                "--generator, demonstrate gentler motions, or, if the recordings are noisy, import "
-                f"them with {'--no-trim, which keeps their still ends, or with ' * moves_on}"
+                remedy="plans are never clipped or slowed down: choose another goal, learn with "
+                "another --generator, demonstrate gentler motions, or, if the recordings are "
+                "noisy, import them "
+                f"with {'--no-trim, which keeps their still ends, or with ' * moves_on}"
                 "--smooth 20 or less",
             )

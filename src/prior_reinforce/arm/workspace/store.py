@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 from prior_reinforce.adapters.base import State
 from prior_reinforce.arm.robots.plan_files import PlanFile, read_plan, write_plan
 from prior_reinforce.arm.workspace.events import KeptPlan
-from prior_reinforce.errors import FileFormatError
+from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError
 from prior_reinforce.files import (
     in_place,
     named_disk_errors,
@@ -64,12 +64,15 @@ class Store:
     def demonstrations(self, sha256: str) -> Demonstrations:
         """Read what was kept."""
         path = self.path("demonstrations", f"{sha256[:_DIGITS]}.npz")
-        found = Demonstrations.load(path)
-        if sha256 != found.sha256:
-            raise FileFormatError(
-                f"{path} is not what was imported; restore it from a copy, or import again"
-            )
-        return found
+        with suppress(FileFormatError, InvalidDemonstrationsError):
+            found = Demonstrations.load(path)
+            if sha256 == found.sha256:
+                return found
+        what = "is not what was imported" if path.exists() else "is missing"
+        raise FileFormatError(
+            f"{path} {what}; restore it from a copy, or bring the recordings in again: "
+            f"prior-reinforce import {self._folder} RECORDINGS"
+        )
 
     def save_model(self, generator: Generator) -> str:
         """Keep a fitted generator; its hash is the name of its folder."""

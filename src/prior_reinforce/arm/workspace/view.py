@@ -23,6 +23,7 @@ from prior_reinforce.arm.workspace.text import (
     say_trial,
     say_warning,
 )
+from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import as_cell
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.session.trials import Goal, Trial, told_of, trials_to_hit
@@ -135,6 +136,8 @@ class StatusView(View, frozen=True):
     demonstrations: int
     source: str | None
     """What they were imported from."""
+    lost: str | None
+    """Why they cannot be read, and what to do; null where they can."""
     model: str | None
     generator: str | None
     remarks: list[str]
@@ -263,16 +266,16 @@ def trial_view(now: Standing, trial: Trial) -> TrialView:
 
 
 def status_view(now: Standing) -> StatusView:
-    """Return where a workspace stands.
-
-    FileFormatError if the demonstrations are missing or damaged.
-    """
+    """Return where a workspace stands."""
     state, manifest, outcomes = now.state, now.manifest, now.manifest.outcome_format
     training, form, imported = state.training, manifest.format, state.demonstrations
     trials = [trial_view(now, trial) for trial in state.trials]
-    nearer = None
-    if imported is not None and now.step == "ask" and not state.current:
-        shown = now.store.demonstrations(imported.sha256)
+    lost = nearer = None
+    try:
+        shown = None if imported is None else now.store.demonstrations(imported.sha256)
+    except FileFormatError as error:
+        shown, lost = None, str(error)
+    if shown is not None and now.step == "ask" and not state.current:
         far = np.any(shown.far_outside(state.goals[-1].goal))
         nearer = f"a goal nearer to the demonstrations: {goal_step(now)}" if far else None
     view = StatusView(
@@ -287,6 +290,7 @@ def status_view(now: Standing) -> StatusView:
         robot=manifest.robot.robot if manifest.robot is not None else None,
         demonstrations=imported.n if imported is not None else 0,
         source=imported.source if imported is not None else None,
+        lost=lost,
         model=training.model if training is not None else None,
         generator=training.generator if training is not None else None,
         remarks=[*training.remarks] if training is not None else [],
@@ -330,6 +334,7 @@ def describe(view: StatusView) -> str:
         ("task", f"{view.task}, tolerance {say_tolerance(view.outcome_format)}"),
         ("plans", f"{columns} a frame, a frame every {view.dt * 1000:g} ms; robot: {robot}"),
         ("demonstrations", f"{n} from {view.source}" if n else "none yet"),
+        *([("  note", view.lost)] if view.lost else []),
         ("model", model),
         *(("  note", remark) for remark in view.remarks),
         *((f"goal {goal.number}", _say_goal(view, goal)) for goal in view.goals),
@@ -346,7 +351,10 @@ def describe(view: StatusView) -> str:
 
 
 def _say_goal(view: StatusView, goal: GoalView) -> str:
-    place = say_place(goal.goal, view.outcome_format)
+    form = view.outcome_format
+    place, own = say_place(goal.goal, form), form.within(goal.tolerance)
+    if say_tolerance(own) != say_tolerance(form):
+        place += f", within {say_tolerance(own)} as it was set"
     if (hits := goal.reached_after) is not None:
         cost = say_cost(goal.demonstrations, hits)
         return f"{place}: reached in {say_count(hits, 'trial')} ({cost})"
