@@ -142,6 +142,9 @@ def test_one_length_with_two_directions_is_refused_with_the_right_form(words):
         ("5cm late", "outcomes have no time: x \\[m], y \\[m]"),
         ("5cm wide", "it has 'wide', which is no unit .* and no direction"),
         ("1/2/3 in long", "write 0.5 for 1/2"),
+        ("5cm l, 2cm r", "'l' may be long or left"),
+        ("5cm r", "'r' may be right"),
+        ("5cm over the hoop", "'over' may be long"),
     ],
 )
 def test_the_word_that_is_not_known_is_named(words, says):

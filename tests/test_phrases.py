@@ -39,6 +39,13 @@ def test_values_are_taken_by_their_names(text, values):
         ("between one and two cm long", "1-2 cm long"),
         ("Half a foot short", "6 in short"),
         ("far too long", "long"),
+        ("Missed completely", "miss"),
+        ("almost hit", "miss"),
+        ("nearly", "miss"),
+        ("perfect", "on the goal"),
+        ("exact", "on the goal"),
+        ("bullseye!", "on the goal!"),
+        ("zero", "0"),
         ("5cm long, 2 cm left", "5cm long, 2 cm left"),
     ],
 )

@@ -56,7 +56,7 @@ _SOMEWHERE, _LOST = "somewhere", "lost"
 _ON_THE_GOAL = ("on the goal", "spot on", "0")
 _HITS = {"hit": True, "miss": False, _LOST: False}
 _RANGE = re.compile(r"(?<=[\da-z\"°.])\s*(?:–|-|\bto\b)\s*(?=\.?\d)")
-_COMMA, _NEXT = re.compile(r"\s*(?:,|;|\band\b)\s*"), re.compile(r"(?<=[a-z])\s+(?=\.?\d)")
+_COMMA, _NEXT = re.compile(r"\s*(?:,|;|&|\band\b)\s*"), re.compile(r"(?<=[a-z])\s+(?=\.?\d)")
 
 
 def from_words(text: str, form: OutcomeFormat | None = None) -> Reading:
@@ -284,12 +284,11 @@ def _numbers_with_units(text: str, units: Sequence[str]) -> list[float] | None:
     """
     if (bare := read_numbers(text)) is not None:
         return [number for number, _ in bare]
-    terms = list(patterns(tuple(units))[2].finditer(text.strip()))
-    if "".join(term[0] for term in terms) != text.strip():
+    if not (terms := _numbers_of_place(text, units)):
         return None
     stated = [term["unit"] and (spelt(term["unit"]) or term["unit"]) for term in terms]
-    if not any(stated[:-1]):
-        stated = stated[-1:] * len(terms)
+    if shared := unit_of_all(text, units):
+        stated = [shared] * len(terms)
     if len(stated) != len(units):
         return [math.nan] * len(stated)
     numbers = []
@@ -300,6 +299,18 @@ def _numbers_with_units(text: str, units: Sequence[str]) -> list[float] | None:
             return None
         numbers.append(number * scale)
     return numbers
+
+
+def unit_of_all(place: str, units: Sequence[str]) -> str:
+    """Return the unit that a place has after its last number only: `cm` of `92 10 cm`; else ""."""
+    *others, last = [term["unit"] for term in _numbers_of_place(place, units)] or [""]
+    return (spelt(last) or last) if others and not any(others) else ""
+
+
+def _numbers_of_place(text: str, units: Sequence[str]) -> list[re.Match[str]]:
+    """Numbers, with or without units, where a text is nothing else."""
+    terms = list(patterns(tuple(units))[2].finditer(text.strip()))
+    return terms if "".join(term[0] for term in terms) == text.strip() else []
 
 
 @dataclass(frozen=True)

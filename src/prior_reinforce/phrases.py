@@ -13,8 +13,9 @@ _FILLERS = re.compile(
 )
 """What people say beside a length, which is an estimate anyway, or beside a direction alone."""
 _PHRASES = {
-    re.compile(r"\b(?:no|not a|did(?:n't| not)) hit\b"): "miss",
-    re.compile(r"\bdead on\b"): "on the goal",
+    re.compile(r"\b(?:no|not a|did(?:n't| not)|almost(?: a)?|nearly(?: a)?) hit\b"): "miss",
+    re.compile(r"\b(?:completely )?missed\b(?: completely)?|^nearly$|^almost$"): "miss",
+    re.compile(r"\b(?:dead on|perfect|exact|bull'?s-? ?eye|on target)\b"): "on the goal",
     re.compile(r"\b(?:past the goal|overshoot|overshot)\b"): "long",
     re.compile(r"\b(?:undershoot|undershot)\b"): "short",
     re.compile(r"\bshort of(?: the goal)?\b"): "short",
@@ -24,12 +25,12 @@ _PHRASES = {
 }
 """What says the same as words that are read."""
 _FRACTION = re.compile(r"(?<![\d.,/])(?:(\d+) +)?(\d)/([1-9])(?![\d/])")
-_NUMBERS = ("one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
+_NUMBERS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 _UNITS = "|".join(filter(str.isalpha, SPELT))
 _IN_WORDS = {
     re.compile(rf"\bhalf (?:an? )?(?=(?:foot|{_UNITS})\b)"): "0.5 ",
     re.compile(rf"\ban? (?=(?:foot|{_UNITS})\b)"): "1 ",
-    **{re.compile(rf"\b{word}\b"): str(n) for n, word in enumerate(_NUMBERS, start=1)},
+    **{re.compile(rf"\b{word}\b"): str(n) for n, word in enumerate(_NUMBERS)},
 }
 """Numbers that are said."""
 _FEET = re.compile(r"(?<!\d)(\d+(?:\.\d+)?)\s*(?:ft|feet|foot)\b")

@@ -45,6 +45,8 @@ SYNONYMS = {
     **dict.fromkeys(("little", "few", "less", "under"), AMOUNT_WORDS[1]),
 }
 """Other words of an error, and which of these they mean."""
+_OTHER_WAYS = {"over": ("long", "high"), "under": ("short", "low")}
+"""Words that may mean several of these."""
 _AXES = {"x": 0, "y": 1, "z": 2, "height": 2}
 CHANCES = (0.0, 0.1), (0.1, 0.65), (0.65, 1.0)
 """Bounds of P(hit) for each word that says how likely a hit is."""
@@ -150,6 +152,22 @@ def say_reading(reading: Reading, form: OutcomeFormat) -> str:
     return to_words(reading.error_seen, form)
 
 
+def say_understood(reading: Reading, form: OutcomeFormat) -> str:
+    """Say which numbers of an error the words were taken for, where they say others; else ""."""
+    if not (in_words(form) and reading.said and reading.has_place):
+        return ""
+    known = np.isfinite(reading.low) & np.isfinite(reading.high)
+    terms = _terms(reading.error_seen, [WORDS[axis] for axis in axes_of(form)])
+    parts = [
+        term if is_number else term.split()[-1]
+        for term, is_number in zip(terms, known, strict=True)
+        if not term.startswith("0 ")
+    ]
+    understood, number = ", ".join(parts), r"\d+(?:\.\d+)?"
+    new = {*re.findall(number, understood)} - {*re.findall(number, reading.said)}
+    return understood if new else ""
+
+
 def say_place(place: ArrayLike, form: OutcomeFormat) -> str:
     """Describe a goal, condition or outcome: `92 cm ahead, 10 cm left`, or `x 0.92 m, t 0.3 s`."""
     if in_words(form):
@@ -222,7 +240,15 @@ def say_unread(
         for word in re.findall(r"[^\W\d_]+", part)
         if word not in (*known, *SPELT, *form.units, "a", "an", "to", "the", "by")
     ]
-    if unknown:
+    hints = [
+        f"{word!r} may be {' or '.join(may)}: write that"
+        for word in unknown
+        if (may := [*filter(known.__contains__, _OTHER_WAYS.get(word, ()))])
+        or (may := [each for each in known if each.startswith(word)])
+    ]
+    if hints:
+        where += f": {'; '.join(hints)}"
+    elif unknown:
         kinds = {kind_of(unit) for unit in form.units}
         units = dict.fromkeys([*(each for each in UNITS if kind_of(each) in kinds), *form.units])
         said_units = ", ".join(unit for unit in units if unit != "1")

@@ -84,7 +84,7 @@ def test_an_error_can_be_told_in_many_ways(run, folder, said, seen):
         (("--error", "50m long"), "say it again, in cm"),
         (("--error", "0.05", "0", "--outcome", "0.9", "0"), "--error or --outcome"),
         (("--outcome", "0.9"), "needs 2 numbers"),
-        (("--outcome", "0.9+-0.1", "0.1+-0.1"), "is not 2 finite numbers"),
+        (("--outcome", "0.9+-0.1", "0.1"), "give all or none"),
         (("--outcome", "there"), "cannot read 'there'"),
         (("somewhere",), '"somewhere" says nothing of where it went; say lost'),
         (("--hit", "--miss"), "drop one of them"),
@@ -172,3 +172,50 @@ def test_a_trial_that_was_voided_by_mistake_is_told_again(run, line):
     assert "trial 1, corrected: 5cm long" in run("amend", line, 1, "5cm long")[1]
     run("ask", line)
     assert "amend" not in run("void", line, 2)[1]
+
+
+@pytest.mark.parametrize(
+    ("said", "understood"),
+    [
+        ("3 inches long", "; understood as 7.6 cm long\n"),
+        ("too far by 0.1 m and a bit right", "; understood as 10 cm long, right\n"),
+        ("0.05 m long", "; understood as 5 cm long\n"),
+        ("5cm long & 2cm left", ": 5cm long & 2cm left\n"),
+        ("long", ": long\n"),
+    ],
+)
+def test_words_that_say_other_numbers_are_said_back_in_centimetres(run, folder, said, understood):
+    asked(run, folder)
+    assert understood in run("tell", folder, 1, said)[1]
+
+
+@pytest.mark.parametrize(("said", "doubted"), [("hit 5cm long", True), ("hit, 2cm long", False)])
+def test_a_hit_that_was_told_to_lie_outside_the_tolerance_is_said_to_be_one(
+    run, folder, said, doubted
+):
+    asked(run, folder)
+    assert ("not within 1.5 cm" in run("tell", folder, 1, said)[1]) == doubted
+    (trial,) = trials_in(folder)
+    assert trial.hit
+
+
+def test_where_it_ended_may_have_a_spread_behind_each_number(run, folder):
+    asked(run, folder)
+    status, _, err = run("tell", folder, 1, "--outcome", "0.92+-0.002", "0.05")
+    assert status == 2
+    assert "give all or none" in err
+    assert run("tell", folder, 1, "--outcome", "0.92+-0.002", "0.05+-0.003")[0] == 0
+    (trial,) = trials_in(folder)
+    np.testing.assert_allclose(trial.error_seen, [0.02, 0.0], atol=1e-12)
+    np.testing.assert_allclose(trial.reading.sd, [0.002, 0.003])
+
+
+@pytest.mark.filterwarnings("ignore:goal 0.9 cm ahead")
+def test_numbers_that_take_the_unit_of_the_last_are_said_to(run, folder):
+    spoken = "numbers without a unit are centimetres"
+    assert spoken in run("goal", folder, "0.9", "5cm")[1]
+    assert spoken not in run("goal", folder, "0.9", "0.05")[1]
+    assert spoken not in run("goal", folder, "92cm ahead, 5 left")[1]
+    run("goal", folder, "0.9", "0.05")
+    run("ask", folder)
+    assert spoken in run("tell", folder, 1, "--outcome", "92", "5cm")[1]

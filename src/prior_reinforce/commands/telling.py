@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
@@ -25,10 +26,11 @@ from prior_reinforce.commands.base import OnWorkspace, Words, trial_and_rest
 from prior_reinforce.errors import ConfigurationError, InvalidFeedbackError
 from prior_reinforce.formats import as_bare_error
 from prior_reinforce.numerals import read_numbers, with_points
-from prior_reinforce.parsing import from_words, read_uncertain_place
+from prior_reinforce.parsing import from_words, read_uncertain_place, unit_of_all
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.trials import Goal, Trial
-from prior_reinforce.wording import bare_units, error_example
+from prior_reinforce.units import UNITS
+from prior_reinforce.wording import bare_units, error_example, say_tolerance, say_understood
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,23 @@ class Seen(OnWorkspace):
         error = None if said_words is None else read_seen(" ".join(said_words), goal)
         return number, error, hit
 
+    def _say_told(self, now: Standing, trial: Trial, words: tuple[str, ...]) -> str:
+        """What was told as it was understood, and that numbers had no unit, if so."""
+        said, reading, goal = say_trial(now, trial), trial.reading, now.state.goal_of(trial)
+        assert reading is not None
+        if understood := say_understood(reading, goal.format):
+            said += f"; understood as {understood}"
+        typed, shared = " ".join(self.error or words), ""
+        if reading.said.split(" (")[0] not in typed:  # before the sign that was understood
+            shared = bare_units(goal.format)
+        elif unit := unit_of_all(" ".join(self.outcome or ()), goal.format.units):
+            shared = UNITS[unit].plural if unit in UNITS else unit
+        said += f"; numbers without a unit are {shared}" * bool(shared)
+        if trial.hit and not goal.is_hit(np.clip(0.0, reading.low, reading.high)):
+            within = say_tolerance(goal.format)
+            said += f"; it counts as a hit, as told, though that is not within {within}"
+        return said
+
 
 @dataclass(frozen=True)
 class Tell(Seen):
@@ -93,7 +112,7 @@ class Tell(Seen):
         _warn_of_its_execution(workspace.standing, number)
         trial = workspace.session().tell(number, seen, hit=hit)
         now = workspace.standing
-        print(f"trial {trial.number}: {_say_told(now, trial, self.error or words)}")
+        print(f"trial {trial.number}: {self._say_told(now, trial, words)}")
         print(f"next: {next_step(now)}")
 
 
@@ -112,7 +131,7 @@ class Amend(Seen):
         number, seen, hit = self.read(workspace, words)
         trial = workspace.session().amend(number, seen, hit=hit)
         now = workspace.standing
-        print(f"trial {trial.number}, corrected: {_say_told(now, trial, self.error or words)}")
+        print(f"trial {trial.number}, corrected: {self._say_told(now, trial, words)}")
         print(
             *say_outdated(now.state), *say_left_out(now.state), f"next: {next_step(now)}", sep="\n"
         )
@@ -157,14 +176,6 @@ def _ask_what_was_seen(workspace: Workspace, number: int, words: tuple[str, ...]
     return f"say what was seen of trial {number}, for instance {seen}, or --hit, or --miss"
 
 
-def _say_told(now: Standing, trial: Trial, typed: tuple[str, ...]) -> str:
-    """What was told as it was understood, and that numbers had no unit, if so."""
-    said, words = say_trial(now, trial), "" if trial.reading is None else trial.reading.said
-    no_unit = words.split(" (")[0] not in " ".join(typed)  # before the sign that was understood
-    bare = bare_units(now.manifest.outcome_format)
-    return f"{said}; numbers without a unit are {bare}" if no_unit else said
-
-
 def _warn_of_its_execution(now: Standing, number: int) -> None:
     """Say before a reading is taken what could make it mislead."""
     trial = now.state.trial(number)
@@ -191,15 +202,20 @@ def read_seen(text: str, goal: Goal) -> Reading | Point:
             f"an error needs {k} numbers, got {len(numbers)}: outcome minus goal in "
             f"{', '.join(form.names)}{example}"
         )
-    bare = np.array([number for number, _ in numbers])
-    sds = [sd for _, sd in numbers if sd is not None]
-    if not sds:
+    bare, sds = np.array([number for number, _ in numbers]), _sds(text, numbers)
+    if sds is None:
         return bare  # the session judges it, which knows what is expected and was shown
-    if len(sds) < k:
+    return Reading.measured(as_bare_error(bare, goal.goal, form), sds)
+
+
+def _sds(text: str, numbers: Sequence[tuple[float, float | None]]) -> Point | None:
+    """Standard deviations of numbers; None if none has one, InvalidFeedbackError if some have."""
+    sds = [sd for _, sd in numbers if sd is not None]
+    if sds and len(sds) < len(numbers):
         raise InvalidFeedbackError(
-            f"{text!r} has +- for {len(sds)} of {k} numbers; give all or none"
+            f"{text!r} has +- for {len(sds)} of {len(numbers)} numbers; give all or none"
         )
-    return Reading.measured(as_bare_error(bare, goal.goal, form), np.array(sds))
+    return np.array(sds) if sds else None
 
 
 def read_landed(text: str, goal: Goal) -> Reading:
@@ -214,7 +230,10 @@ def read_landed(text: str, goal: Goal) -> Reading:
             f"--outcome needs {k} numbers, got {len(numbers)}: {', '.join(form.names)}"
         )
     if numbers is not None:
-        as_bare_error([number for number, _ in numbers], goal.goal, form, landed=True)
+        bare, sds = [number for number, _ in numbers], _sds(text, numbers)
+        error = as_bare_error(bare, goal.goal, form, landed=True)
+        if sds is not None:
+            return Reading.measured(error, sds)
     place, sd = read_uncertain_place(text, form, goal.goal[None])
     error = place - goal.goal
     return Reading.measured(error, sd) if sd else Reading.estimated(error, form.least_sd)

@@ -136,7 +136,7 @@ class Ask(OnWorkspace):
             known, shown = workspace.manifest.outcome_format, workspace.demonstrations.outcomes_seen
             if not goals or goals[-1].goal.tolist() != [*as_place(place, known, shown)]:
                 workspace.set_goal(place)
-            print_goal(workspace)
+            print_goal(workspace, place)
         session = workspace.session()
         recovered = recover(workspace)
         if recovered is not None:

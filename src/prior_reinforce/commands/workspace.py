@@ -30,6 +30,7 @@ from prior_reinforce.commands.questions import answer_to, until_read
 from prior_reinforce.errors import ConfigurationError, UnclearFlangeError
 from prior_reinforce.files import named_disk_errors
 from prior_reinforce.formats import in_tolerances
+from prior_reinforce.parsing import unit_of_all
 from prior_reinforce.plans.kinematics import UPRIGHT, first_axis, leaning
 from prior_reinforce.units import UNITS
 from prior_reinforce.wording import say_beyond, say_place, say_tolerance
@@ -186,11 +187,13 @@ def _say_robot(robot: RobotLimits) -> str:
     )
 
 
-def print_goal(workspace: Workspace) -> None:
-    """Say which goal the next trials are for."""
+def print_goal(workspace: Workspace, typed: str) -> None:
+    """Say which goal the next trials are for, and that typed numbers had no unit, if so."""
     goal = workspace.state.goals[-1]
     place, within = say_place(goal.goal, goal.format), say_tolerance(goal.format)
-    print(f"goal {goal.number}: {place}; within {within}")
+    shared = unit_of_all(typed, goal.format.units)
+    no_unit = f"; numbers without a unit are {UNITS[shared].plural}" if shared in UNITS else ""
+    print(f"goal {goal.number}: {place}; within {within}{no_unit}")
     shown, form = workspace.demonstrations, goal.format
     near = shown.nearest_inside(goal.goal)
     beyond = np.abs(goal.goal - near)
@@ -225,13 +228,14 @@ class Goal(OnWorkspace):
     takes_words = True
 
     def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
+        typed = " ".join(words)
         workspace.set_goal(
-            " ".join(words),
+            typed,
             carry_over=None if self.memory is None else self.memory == "workspace",
             adapter=self.adapter,
             new_hardware=self.new_hardware,
         )
-        print_goal(workspace)
+        print_goal(workspace, typed)
         print_next(workspace)
 
 
