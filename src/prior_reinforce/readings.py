@@ -201,6 +201,11 @@ class Reading:
         return bool(np.any(np.isfinite(self.low) | np.isfinite(self.high)))
 
     @property
+    def is_open(self) -> bool:
+        """Whether some component has an open end: only its direction was seen, or not even that."""
+        return not bool(np.isfinite([*self.low, *self.high]).all())
+
+    @property
     def has_number(self) -> bool:
         """Whether `error_seen` is informative: some bound is known, or that it hit."""
         return bool(self.hit or self.has_place)

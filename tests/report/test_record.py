@@ -4,8 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.patches import FancyArrowPatch
 
 from prior_reinforce.errors import ConfigurationError, InvalidGoalError
+from prior_reinforce.parsing import from_words
+from prior_reinforce.report.places import draw_close_up
 from tests.report.swing_world import adaptation, told
 
 GOAL = np.array([0.92, -0.10])
@@ -28,6 +31,18 @@ def test_a_hit_is_drawn_within_its_circle_however_coarsely_it_was_called():
     hit = replace(told([0.03, 0.04]).trials[0], hit=True)
     (drawn,) = replace(record, trials=(hit,)).landings
     np.testing.assert_allclose(drawn - GOAL, [0.009, 0.012])
+
+
+def test_a_direction_alone_is_no_measured_place():
+    record = told([0.05, 0.0], [0.05, 0.0], [0.05, 0.0])
+    first, second, third = record.trials
+    second = replace(second, reading=from_words("long, somewhere"))
+    third = replace(third, reading=from_words("long"), hit=True)
+    record = replace(record, trials=(first, second, third))
+    assert record.directions == {2}
+    axes = draw_close_up(record).axes[0]
+    arrows = [patch for patch in axes.patches if isinstance(patch, FancyArrowPatch)]
+    assert [arrow.get_linestyle() == "-" for arrow in arrows] == [True, False, True]
 
 
 def test_the_true_outcome_of_a_voided_trial_does_not_count():

@@ -145,7 +145,8 @@ class Panel:
 
         With `aims`, where they were aimed instead, each with an arrow from the aim before, hollow
         where a trial was voided; `numbered`, with their numbers, and on a line each in a row;
-        `with_truth`, also where they truly landed, as far as that is known.
+        `with_truth`, also where they truly landed, as far as that is known. Dashed and hollow is a
+        direction alone.
         """
         places: list[_Place] = []
         true_places: list[_Place] = []
@@ -161,9 +162,12 @@ class Panel:
             start = self._place(record.goal, row)
             if aims:
                 start = places[-1] if places else place
+            vague = not aims and trial.number in record.directions
             if start is not place:
-                self._draw_arrow(start, place, colour, dashed=aims)
-            if aims and trial.stage is Stage.VOIDED:
+                self._draw_arrow(start, place, colour, dashed=aims or vague)
+            if vague:
+                self._mark(place, "o", "white", edge=colour, zorder=6)
+            elif aims and trial.stage is Stage.VOIDED:
                 self._mark(place, "s", "white", edge=colour, zorder=6)
             else:
                 self._mark(place, "s" if aims else "o", colour, zorder=6)

@@ -141,9 +141,17 @@ class AdaptationRecord:
     def distance_seen(self, trial: Trial) -> float | None:
         """How far off a trial was seen to be, in `distance_unit`; None where nobody told."""
         reading = trial.reading
-        if reading is None or not np.isfinite([*reading.low, *reading.high]).all():
-            return None
-        return self.distance(reading.error_seen)
+        return None if reading is None or reading.is_open else self.distance(reading.error_seen)
+
+    @property
+    def directions(self) -> frozenset[int]:
+        """Numbers of trials whose landing stands for a direction alone: nobody said how far."""
+        placed = zip(self.trials, self.landings, strict=True)
+        return frozenset(
+            trial.number
+            for trial, landing in placed
+            if landing is not None and not trial.hit and self.distance_seen(trial) is None
+        )
 
     @property
     def landings(self) -> tuple[Point | None, ...]:

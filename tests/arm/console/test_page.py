@@ -518,6 +518,20 @@ def test_a_place_is_typed_from_field_to_field(at, serve, size):
         np.testing.assert_allclose(workspace.state.goals[0].goal, [0.9, -0.05], atol=1e-9)
 
 
+@pytest.mark.parametrize("typed", ["1.10 m", "12 right", "abc"])
+def test_what_cannot_be_read_of_a_place_says_what_is_wanted(at, serve, typed):
+    page = at(serve())
+    page.click("#sum-fields")
+    page.fill("#field-0", typed)
+    expect(page.locator("#goal")).to_be_disabled()
+    expect(page.locator("#unread-0")).to_have_text("Type a number alone, in cm")
+    page.fill("#field-0", "1,10")
+    expect(page.locator("#unread-0")).to_have_count(0)
+    expect(page.locator("#read-0")).to_have_text("Read as 1.1 cm")
+    page.fill("#field-0", "110")
+    expect(page.locator("#read-0")).to_have_count(0)
+
+
 def executed(at, serve):
     """A console and its page after a first trial, where it asks for words by eye."""
     served = serve()

@@ -61,7 +61,7 @@ def test_the_schema_is_stable():
     assert {n: len(f) for n, f in fields.items()} == {
         "StatusView": 25,
         "GoalView": 9,
-        "TrialView": 23,
+        "TrialView": 24,
         "AskView": 6,
         "AdviceView": 11,
         "InspectView": 9,
@@ -75,6 +75,12 @@ def test_trials_say_what_was_told(run, afternoon):
     assert (void["reason"], void["error"], void["hit"], void["told"]) == (None, None, None, None)
     assert direction["said"] == "long, somewhere"
     assert direction["error"][0] > 0
+    assert [trial["vague"] for trial in (first, void, direction, hit)] == [
+        False,
+        False,
+        True,
+        False,
+    ]
     assert hit["hit"] is True
     assert (hit["error"], hit["outcome"]) == (None, None)  # nobody said where in the goal
     assert run("trials", afternoon)[1].splitlines()[3].endswith(": reached (hit)")

@@ -443,7 +443,7 @@ function drawMap() {
     if (!trial.outcome) continue;
     const [u, v] = uv(xy(trial.outcome));
     const old = trial.goal !== S.goals.length;
-    parts.push(g("circle", { class: `trial${old ? " old" : ""}${trial.hit ? " landed" : ""}`, cx: u, cy: v, r: (old ? 4 : 11) * px }));
+    parts.push(g("circle", { class: `trial${old ? " old" : ""}${trial.hit ? " landed" : ""}${trial.vague ? " vague" : ""}`, cx: u, cy: v, r: (old ? 4 : 11) * px }));
     if (!old) parts.push(g("text", { class: "on", x: u, y: v + 5 * px, size: 13 * px }, `${trial.number}`));
   }
   const waiting = openTrial();
@@ -521,7 +521,7 @@ function drawRuler(ruler) {
   }
   for (const trial of S.trials) {
     if (!trial.outcome || trial.goal !== S.goals.length) continue;
-    parts.push(g("circle", { class: `trial${trial.hit ? " landed" : ""}`, cx: at(trial.outcome[i]), cy: middle, r: 11 }), g("text", { class: "on", x: at(trial.outcome[i]), y: middle + 5, size: 13 }, `${trial.number}`));
+    parts.push(g("circle", { class: `trial${trial.hit ? " landed" : ""}${trial.vague ? " vague" : ""}`, cx: at(trial.outcome[i]), cy: middle, r: 11 }), g("text", { class: "on", x: at(trial.outcome[i]), y: middle + 5, size: 13 }, `${trial.number}`));
   }
   const waiting = openTrial();
   if (waiting && waiting.stage !== "executed") parts.push(g("circle", { class: "aim", cx: at(waiting.condition[i]), cy: middle, r: 18 }));
@@ -540,6 +540,7 @@ function drawBar() {
   if (touching() === "goal" && reach.goals.length) legend.push("○ within the arm's reach, × not");
   if (S.goals.length) legend.push("✛ goal, its tolerance around it");
   if (S.trials.some((trial) => trial.outcome && trial.goal === S.goals.length)) legend.push("● trials by number, green where they hit");
+  if (S.trials.some((trial) => trial.vague && trial.goal === S.goals.length)) legend.push("◌ only its direction was seen");
   if (waiting && waiting.stage !== "executed") legend.push("dashed: where the next plan aims");
   $("legend").textContent = legend.join(" · ");
   fill("mapbar",
@@ -670,8 +671,15 @@ function fields() {
       Object.assign(L, { mark, measured: 0, words: {} });
       draw();
     },
-  }))));
+  }), typedRemark(c, i))));
 }
+// Why nothing is read, or what a comma is taken for.
+const typedRemark = (c, i) => {
+  const typed = (L.typed[i] || "").trim();
+  const at = typedNumber(c, i);
+  if (typed && at === null) return h("small", { class: "ask", id: `unread-${i}` }, `Type a number alone, in ${c.shown}`);
+  return typed.includes(",") && L.mark && L.mark[i] === at ? h("small", { id: `read-${i}` }, `Read as ${number(c, at)} ${c.shown}`) : null;
+};
 const typedNumber = (c, i) => {
   const said = plainNumber(L.typed[i] || "");
   return said === null ? null : said / c.factor;

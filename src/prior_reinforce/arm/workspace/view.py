@@ -87,6 +87,8 @@ class TrialView(View, frozen=True):
     error: list[float] | None
     """What was seen, outcome minus goal; of a direction alone, what it is taken to be; null too
     where nothing but a hit, a miss or a loss was told."""
+    vague: bool
+    """Whether it stands for a direction alone."""
     seen: str | None
     """The same in words."""
     said: str | None
@@ -247,6 +249,7 @@ def trial_view(now: Standing, trial: Trial) -> TrialView:
         condition=trial.condition.tolist(),
         outcome=None if error is None else (now.state.goal_of(trial).goal + error).tolist(),
         error=None if error is None else error.tolist(),
+        vague=error is not None and not trial.hit and reading is not None and reading.is_open,
         seen=seen,
         said=reading.said or None if reading is not None else None,
         hit=trial.hit if reading is not None else None,
