@@ -12,6 +12,7 @@ from PIL import Image
 
 from prior_reinforce.adapters.base import Expectation
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.parsing import from_words
 from prior_reinforce.report import page, record_film, write_report
 from prior_reinforce.report.record import CheckRow
 from tests.report.swing_world import FullStep, adaptation, demonstrations, pictures, told
@@ -317,3 +318,12 @@ def test_what_the_gate_said_stands_beside_the_plans(report, tmp_path):
     assert "velocity passes, warns joint4 at 2.1 rad/s, 97 % of 2.175 2" in words
     assert "box not checked" in words
     assert "What the gate said" not in report[1].words
+
+
+def test_a_direction_alone_is_said_to_be_dashed_and_no_goal_reached_that_was_not(tmp_path):
+    seen = told([0.05, 0.0])
+    vague = replace(seen.trials[0], reading=from_words("long, somewhere"))
+    for record, dashed in ((seen, False), (replace(seen, trials=(vague,)), True)):
+        words = read(write_report(tmp_path / f"{dashed}", [record], title="t")).words
+        assert ("Dashed: only the direction was seen." in words) == dashed
+        assert "; counts as reached within 1.5 cm" in words

@@ -27,7 +27,7 @@ from prior_reinforce.arm.workspace.execute import (
     say_look,
     to_execute,
 )
-from prior_reinforce.arm.workspace.state import WorkspaceState
+from prior_reinforce.arm.workspace.state import Standing
 from prior_reinforce.arm.workspace.text import (
     execution_warning,
     next_step,
@@ -152,7 +152,7 @@ class Ask(OnWorkspace):
             note_not_moved(workspace)
         reached_before = now.state.solved
         trial = session.ask()
-        self._show(workspace, now.state, trial, reached_before)
+        self._show(workspace, now, trial, reached_before)
         if now.state.stage(trial) == "executed":
             if self.run_command or self.execute:
                 to_execute(workspace, trial.number)  # which refuses
@@ -258,17 +258,17 @@ class Ask(OnWorkspace):
             )
 
     def _show(
-        self, workspace: Workspace, state: WorkspaceState, trial: Trial, reached_before: bool
+        self, workspace: Workspace, now: Standing, trial: Trial, reached_before: bool
     ) -> None:
         """Print where the trial aims and what the gate says, and write --out."""
-        manifest = workspace.manifest
-        outcome, goal = manifest.outcome_format, state.goals[trial.goal_number - 1].goal
+        manifest, state = workspace.manifest, now.state
+        outcome, goal = manifest.outcome_format, state.goal_of(trial).goal
         aims = f"trial {trial.number}: aims at {say_place(trial.condition, outcome)}"
         beside = to_words(trial.condition - goal, outcome) if in_words(outcome) else ""
         if beside and beside != to_words(0.0 * goal, outcome):
             aims += f" ({beside} of the goal, so that it lands there)"
         print(aims)
-        expected = say_expectation(workspace.standing, trial)
+        expected = say_expectation(now, trial)
         for line in (*expected, *say_left_out(state), *say_outdated(state)):
             print(line)
         if reached_before:

@@ -145,6 +145,13 @@ def test_demonstrations_that_are_gone_are_named_everywhere_with_what_brings_them
             assert remedy in err
 
 
+def test_before_a_goal_too_it_is_said_where_the_manifest_means_other_numbers(run, folder):
+    manifest = Path(folder, "workspace.toml")
+    manifest.write_text(manifest.read_text().replace('units = ["m", "m"]', 'units = ["cm", "cm"]'))
+    out = run("status", folder)[1]
+    assert "what was imported has outcome units ('m', 'm')" in out
+
+
 def test_a_goal_that_keeps_a_tolerance_of_before_says_so(run, folder):
     run("goal", folder, "0.9", "0.05")
     assert "within" not in run("status", folder)[1]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from msgspec import Struct, structs
 
-from prior_reinforce.arm.workspace.manifest import UNKNOWN
+from prior_reinforce.arm.workspace.manifest import MANIFEST_FILE, UNKNOWN
 from prior_reinforce.arm.workspace.state import Standing, Step, WorkspaceState
 from prior_reinforce.arm.workspace.text import (
     goal_step,
@@ -23,7 +23,7 @@ from prior_reinforce.arm.workspace.text import (
     say_trial,
     say_warning,
 )
-from prior_reinforce.errors import FileFormatError
+from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError
 from prior_reinforce.files import as_cell
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.session.trials import Goal, Trial, told_of, trials_to_hit
@@ -139,7 +139,7 @@ class StatusView(View, frozen=True):
     source: str | None
     """What they were imported from."""
     lost: str | None
-    """Why they cannot be read, and what to do; null where they can."""
+    """Why they cannot be used, and what to do; null where they can."""
     model: str | None
     generator: str | None
     remarks: list[str]
@@ -273,11 +273,13 @@ def status_view(now: Standing) -> StatusView:
     state, manifest, outcomes = now.state, now.manifest, now.manifest.outcome_format
     training, form, imported = state.training, manifest.format, state.demonstrations
     trials = [trial_view(now, trial) for trial in state.trials]
-    lost = nearer = None
+    lost = nearer = shown = None
     try:
-        shown = None if imported is None else now.store.demonstrations(imported.sha256)
-    except FileFormatError as error:
-        shown, lost = None, str(error)
+        if imported is not None:
+            shown = now.store.demonstrations(imported.sha256)
+            manifest.check_fit(shown, "what was imported", now.folder / MANIFEST_FILE)
+    except (FileFormatError, InvalidDemonstrationsError) as error:
+        lost = str(error)
     if shown is not None and now.step == "ask" and not state.current:
         far = np.any(shown.far_outside(state.goals[-1].goal))
         nearer = f"a goal nearer to the demonstrations: {goal_step(now)}" if far else None
