@@ -97,11 +97,19 @@ def test_without_the_pictures_size_nothing_is_said():
 
 def test_the_best_camera_misses_points_that_are_stretched():
     camera = np.array([0.75, 0.0, 2.4])
-    true = calibrated(camera, 0.1)
-    stretched = TableCalibration.fit(POINTS * [1, 1.5], seen(POINTS, camera, 0.1), picture=SIZE)
-    assert least_miss(true) < 0.5
-    assert least_miss(stretched) > 20
-    assert least_miss(calibrated(camera, 0.1, picture=None)) == 0.0
+    pixels = seen(POINTS, camera, 0.1)
+    stretched = TableCalibration.fit(POINTS * [1, 1.5], pixels, picture=SIZE)
+    assert least_miss(calibrated(camera, 0.1), pixels) < 0.5
+    assert least_miss(stretched, pixels) > 20
+    assert least_miss(calibrated(camera, 0.1, picture=None), pixels) == 0.0
+
+
+def test_corners_seen_aslant_by_a_camera_that_is_turned_are_where_a_camera_sees_them():
+    middle, turned = np.array([640.0, 640.0]), np.sqrt(0.5) * np.array([[1, 1], [-1, 1]])
+    corners, size = POINTS[[0, 2, 8, 6]], (1280, 1280)
+    pixels = middle + (seen(corners, np.array([-0.1, 0.0, 0.4]), 1.1, middle) - middle) @ turned
+    pixels += np.random.default_rng(0).normal(size=pixels.shape)
+    assert least_miss(TableCalibration.fit(corners, pixels, picture=size), pixels) < 3
 
 
 @pytest.mark.parametrize(("camera", "tilt"), [((0.0, 0.1, 1.2), 0.6), ((0.8, 0.0, 2.0), 0.0)])

@@ -26,8 +26,8 @@ _CLOSE = 0.03
 and a metre typed for a centimetre makes 3 m of it."""
 _STRETCHED, _IMPOSSIBLE = 0.0035, 0.015
 """From which miss of the best camera on a calibration is warned of, and refused, as a share of the
-picture's longer side. Ours: clicks that are 1 px off in 1280 come to 0.0026 from any side, a bent
-lens to 0.001, from above a side that is a tenth too long to 0.006 to 0.014, another corner to 0.05
+picture's longer side. Ours: clicks that are 1 px off in 1280 come to 0.0021 from any side, a bent
+lens to 0.0004, from above a side that is a tenth too long to 0.006 to 0.016, another corner to 0.05
 or more. From the side a focal length hides up to a half."""
 _NOISE = 3.0
 """Below so many [px] a miss is the clicks'; ours: as in a small picture."""
@@ -76,7 +76,7 @@ def calibrate(
             f"all points lie within {100 * apart:.1f} cm, as where metres are typed for "
             "centimetres; a file is in metres, the page in centimetres"
         )
-    miss = least_miss(calibration)
+    miss = least_miss(calibration, np.asarray(pixels, dtype=float))
     if picture is not None and miss > max(_NOISE, _IMPOSSIBLE * max(picture)):
         raise ConfigurationError(
             f"no camera sees the points there: the best is {miss:.0f} px off. Measure both sides "
@@ -90,8 +90,9 @@ def of_calibration(
     calibration: TableCalibration, points: ArrayLike, pixels: ArrayLike
 ) -> list[str]:
     """Return why a calibration, by these points [m] and pixels, is coarse, or may be stretched."""
-    said = []
-    miss, picture = least_miss(calibration), calibration.picture
+    said, picture = [], calibration.picture
+    places, seen = np.asarray(points, dtype=float), np.asarray(pixels, dtype=float)
+    miss = least_miss(calibration, seen)
     if picture is not None and miss > max(_NOISE, _STRETCHED * max(picture)):
         said.append(
             f"the best camera sees the points {miss:.0f} px off, as where one side is measured or "
@@ -99,7 +100,6 @@ def of_calibration(
         )
     if calibration.sd <= COARSE:
         return said
-    places, seen = np.asarray(points, dtype=float), np.asarray(pixels, dtype=float)
     _, others_off = left_out_errors(places, seen)
     # Without the point that is wrong the others agree, where they are enough to disagree; one that
     # is not tested may be the wrong one.

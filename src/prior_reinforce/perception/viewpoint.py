@@ -26,18 +26,22 @@ def possible_places(calibration: TableCalibration) -> Float[np.ndarray, "n 3"]:
 
     None where the picture's size, or where the points were clicked, is not known.
     """
-    places, misses = _places_by_focal_length(calibration)
-    return places[misses <= misses.min(initial=np.inf) + _SLACK]
+    if calibration.picture is None or calibration.clicked is None:
+        return np.empty((0, 3))
+    places, misses = _places_by_focal_length(calibration, _corners(calibration.clicked))
+    return places[misses <= misses.min() + _SLACK]
 
 
-def least_miss(calibration: TableCalibration) -> float:
-    """Return how far off the best camera with square pixels sees the points, in [px].
+def least_miss(calibration: TableCalibration, pixels: Float[np.ndarray, "n 2"]) -> float:
+    """Return how far off the best camera with square pixels sees the clicked points, rms, in [px].
 
-    0 where nothing is known. Other points than the clicked ones are seen so where a length was
-    measured or typed wrongly, or begun at another corner, in all of them alike.
+    0 where the picture's size is not known. Other points than the clicked ones are seen so where a
+    length was measured or typed wrongly, or begun at another corner, in all of them alike.
     """
-    _, misses = _places_by_focal_length(calibration)
-    return float(misses.min(initial=np.inf)) if len(misses) else 0.0
+    if calibration.picture is None:
+        return 0.0
+    # No corner of the box around them, which may be seen beyond the horizon.
+    return float(_places_by_focal_length(calibration, pixels)[1].min())
 
 
 def slope_at(
@@ -57,13 +61,11 @@ def slope_at(
 
 
 def _places_by_focal_length(
-    calibration: TableCalibration,
-) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, " n"]]:
-    """For each f, where the camera hangs that sees the points best, and how far off, in [px]."""
-    if calibration.picture is None or calibration.clicked is None:
-        return np.empty((0, 3)), np.empty(0)
-    corners = _corners(calibration.clicked)
-    on_table = calibration.to_table(corners)
+    calibration: TableCalibration, pixels: Float[np.ndarray, "n 2"]
+) -> tuple[Float[np.ndarray, "m 3"], Float[np.ndarray, " m"]]:
+    """For each f, where the camera hangs that sees these pixels best, and how far off, in [px]."""
+    assert calibration.picture is not None
+    on_table = calibration.to_table(pixels)
     near = on_table.mean(axis=0)
     middle = np.array(calibration.picture) / 2
     to_middle, from_near = np.eye(3), np.eye(3)
@@ -76,7 +78,7 @@ def _places_by_focal_length(
         axes = left @ right
         turn = np.column_stack([axes, np.cross(*axes.T)])
         shift = centred[:, 2] / [focal, focal, 1.0] / stretch.mean()
-        misses.append(_miss(focal, (on_table - near) @ axes.T + shift, corners - middle))
+        misses.append(_miss(focal, (on_table - near) @ axes.T + shift, pixels - middle))
         places.append([*near, calibration.height] - turn.T @ shift)
     return np.array(places), np.array(misses)
 
@@ -124,9 +126,9 @@ def camera_costs(
     return min(costs, default=0.0)
 
 
-def _miss(focal: float, at: Float[np.ndarray, "4 3"], seen: Float[np.ndarray, "4 2"]) -> float:
+def _miss(focal: float, at: Float[np.ndarray, "n 3"], seen: Float[np.ndarray, "n 2"]) -> float:
     """How far places before a camera, in any unit, are from where they are seen, rms, in [px]."""
-    return float(np.linalg.norm(focal * at[:, :2] / at[:, 2:] - seen) / 2)
+    return float(np.linalg.norm(focal * at[:, :2] / at[:, 2:] - seen) / len(seen) ** 0.5)
 
 
 def _corners(box: tuple[float, float, float, float] | None) -> Float[np.ndarray, "4 2"]:
