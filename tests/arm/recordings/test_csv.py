@@ -651,12 +651,12 @@ def test_numbers_of_episodes_that_begin_anew_with_a_session_are_refused(tmp_path
         read_recordings(path)
 
 
-def test_frames_that_a_column_calls_invalid_are_lost(tmp_path):
+@pytest.mark.parametrize("flags", [(0, 1), (False, True)])
+def test_frames_that_a_column_calls_invalid_are_lost(tmp_path, flags):
     times, q = sampled(0, 50)
-    flag = np.where(np.isin(np.arange(len(q)), (20, 21)), 0, 1)
-    rows = np.column_stack([times, q, flag])
-    names = ",".join(["t", *JOINTS, "valid"])
-    np.savetxt(tmp_path / "0.csv", rows, delimiter=",", header=names, comments="")
+    flag = [flags[i not in (20, 21)] for i in range(len(q))]
+    frames = pd.DataFrame(np.column_stack([times, q]), columns=["t", *JOINTS]).assign(valid=flag)
+    frames.to_csv(tmp_path / "0.csv", index=False)
     (found,) = read_recordings(tmp_path)
     assert found.names == tuple(JOINTS)
     assert np.flatnonzero(np.isnan(found.positions).all(axis=1)).tolist() == [20, 21]

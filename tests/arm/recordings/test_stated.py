@@ -14,7 +14,7 @@ from prior_reinforce.arm.recordings.stated import (
     units_said,
     without_invalid,
 )
-from prior_reinforce.errors import FileFormatError
+from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError
 from tests.arm.recordings.recorded import UR, Q
 
 
@@ -98,8 +98,16 @@ def test_frames_that_were_not_measured_by_a_flag_are_lost(called):
         texts={}, names=UR,
     )  # fmt: skip
     assert np.flatnonzero(np.isnan(found.positions).all(axis=1)).tolist() == [0, 1, 50]
-    whole = without_invalid(Q, {called: flag * 2, "valid": np.ones(3), "invalid": flag})
+    assert any(called in remark for remark in found.remarks)
+    others = {called: flag * 2, "valid": np.ones(3), "invalid": flag, "ball/tracked": flag}
+    whole, said = without_invalid("0", Q, others)
     np.testing.assert_array_equal(whole, Q)
+    assert said == ()
+
+
+def test_a_flag_that_calls_most_frames_unmeasured_is_named_for_it_may_be_of_something_else():
+    with pytest.raises(InvalidDemonstrationsError, match=r"tracked.*rename.*--leave-out"):
+        without_invalid("0", Q, {"tracked": np.arange(101) < 60})
 
 
 def test_nan_to_the_end_of_every_joint_is_padding_and_within_is_not():

@@ -272,16 +272,17 @@ def _episode(
     if not all_read:  # else only those that change between a few: `on` and `off`
         texts = [i for i in texts if 1 < len({*table.cells[i]} - {""}) <= _MOST_WORDS]
     absent = [i for i in channels if found is None and np.all(table.values[:, i] == _ABSENT)]
-    flags = [i for i in others if table.named and says_valid(called[i])]
+    flags = {i: _flag(table, i) for i in others if table.named and says_valid(called[i])}
     for left, why in (
-        (flags, "says which frames were measured"),
+        ([*flags], "is no joint by its name"),
         (absent, "is 9E+09 all along, as ABB writes of an axis that is not there"),
         (rising, "rises with every row, as times and counters do"),
-        (texts, "holds no number"),
+        ([i for i in texts if i not in flags], "holds no number"),
     ):
         channels = [i for i in channels if i not in left]
         remarks += [f"{say_names([called[i] for i in left])} left out, which {why}"] * bool(left)
-    measured = {called[i]: table.values[:, i] for i in flags}
+    measured = {called[i]: flag for i, flag in flags.items()}
+    positions, unmeasured = without_invalid(episode, table.columns(channels), measured)
     twins = all_read and twin_vectors([called[i] for i in channels], table.values[:, channels])
     own, units = without_units([called[i] for i in channels])
     is_named = named or said.keys() >= {*channels}
@@ -292,10 +293,10 @@ def _episode(
     return recorded(
         episode,
         clock,
-        without_invalid(table.columns(channels), measured),
+        positions,
         tuple(own_names),
         named=is_named,
-        remarks=tuple(remarks),
+        remarks=(*remarks, *unmeasured),
         units=tuple(table.units[i] or u for i, u in zip(channels, units, strict=True)),
         ambiguities=(*guessed, *clock.ambiguities, *(twins or ())),
         columns=own if table.named else (),
@@ -381,6 +382,13 @@ def _cells(table: Table, columns: Sequence[int], row: int) -> tuple[str, ...]:
     """The texts of some cells of a row, or of the list in an only one."""
     own = [table.cells[i][row] for i in columns]
     return words(own[0] if len(own) == 1 else own)
+
+
+def _flag(table: Table, column: int) -> np.ndarray:
+    """A column's numbers; of `True`, as pandas writes it, 1, and of `False` 0."""
+    said = {"true": 1.0, "false": 0.0}
+    cells = zip(table.cells[column], table.values[:, column], strict=True)
+    return np.array([said.get(cell.lower(), number) for cell, number in cells])
 
 
 def _by_key(

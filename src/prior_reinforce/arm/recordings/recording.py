@@ -28,6 +28,9 @@ Episodes = Iterable[tuple[str, Callable[[], "Recording"]]]
 """What a format's reader yields: names, and how to read each; left-out episodes are never read."""
 _WIDER = 5
 """Times as many columns without names as frames that no motion has. Ours."""
+MOST_LOST = 0.1
+"""Share of an episode's frames that may be lost. Ours: lost packets come in bursts of some frames;
+where more is missing, the recorder failed."""
 _LEAP = 3.0
 """Steps of a motion, as large as its largest, that make a leap. Ours."""
 EPISODE_COLUMNS = tuple(

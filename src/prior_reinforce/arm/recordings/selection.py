@@ -18,7 +18,7 @@ from prior_reinforce.arm.recordings.naming import (
     missing_channels,
     numbered_like,
 )
-from prior_reinforce.arm.recordings.recording import Recording, or_leave_out
+from prior_reinforce.arm.recordings.recording import MOST_LOST, Recording, or_leave_out
 from prior_reinforce.arm.recordings.takes import in_one_unit, odd_takes
 from prior_reinforce.arm.recordings.units import Ambiguity, conversion, say_names, split_unit
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
@@ -35,9 +35,6 @@ from prior_reinforce.plans.whole_turns import TURN
 from prior_reinforce.units import UNITS
 from prior_reinforce.wording import listed
 
-_MOST_LOST = 0.1
-"""Share of an episode's frames that may be lost. Ours: lost packets come in bursts of some frames;
-where more is missing, the recorder failed."""
 _LIKE_RATES = "look like velocities, torques or the like"
 _BEYOND = 5.0
 """A few frames that are so many times as large, or lead so many times as far, as all others were
@@ -313,7 +310,7 @@ def _refuse_failed_reads(
             continue
         no_angle = kind is Kind.ANGLE and most[i] > UNITS["deg"].largest
         moves = rest[i] > 0 and not {0, len(size) - 1} & {*far.tolist()}
-        few = len(far) < _MOST_LOST * len(size) and (no_angle or moves)
+        few = len(far) < MOST_LOST * len(size) and (no_angle or moves)
         alike = max(usual[j] for j, other in enumerate(of_kind) if other is kind)
         if few and most[i] > alike and _BEYOND * rest[i] < most[i]:
             raise InvalidDemonstrationsError(
@@ -356,7 +353,7 @@ def _picked(recording: Recording, columns: list[int], joints: tuple[str, ...]) -
     if np.any(lost):
         frame, channel = np.argwhere(bad)[0].tolist()
         what = f"{called[channel]} is {positions[frame, channel]} at frame {frame}"
-        if np.mean(lost) > _MOST_LOST:
+        if np.mean(lost) > MOST_LOST:
             raise InvalidDemonstrationsError(
                 f"episode {recording.episode}: {what}, expected a finite number, and {lost.sum()} "
                 f"of {len(lost)} frames are lost so; mend or drop that episode (--leave-out)"

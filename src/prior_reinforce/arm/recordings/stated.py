@@ -24,6 +24,7 @@ from prior_reinforce.arm.recordings.naming import (
     missing_channels,
 )
 from prior_reinforce.arm.recordings.recording import (
+    MOST_LOST,
     Positions,
     Recording,
     recorded,
@@ -37,7 +38,7 @@ from prior_reinforce.arm.recordings.units import (
     known_unit,
     say_names,
 )
-from prior_reinforce.errors import FileFormatError
+from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError
 from prior_reinforce.plans.channels import (
     Kind,
     is_of_pose,
@@ -67,8 +68,11 @@ if that is more. Ours: sound has more."""
 _FAR_OFF, _SLACK = 5.0, 0.01
 """Standard deviations by which the middle of a motion is off what is said of its mean, and rounding
 of what is said. Ours: a motion is one of those of which it is said."""
-_VALID = re.compile(r"((is|frame|pose|data)_)?(valid|tracked)(_(mask|flag))?")
-"""Flags that are 0 in frames that were not measured."""
+_VALID = re.compile(
+    r"((observations?|obs|data|frames?|robot|arm|joints?|joint_states?)[/.])*"
+    r"((is|frame|pose|data)_)?(valid|tracked)(_(mask|flag))?"
+)
+"""Flags that are 0 in frames that were not measured; `ball/tracked` is of something else."""
 _STEMS = re.compile("[/.]")
 """What parts an array's own name from where it is: `observations/q`, `stats.q_mean`."""
 
@@ -161,7 +165,7 @@ def recorded_among(
         for each in (arrays, stated)
     )
     positions, known = _joined(where, keys, arrays, texts, options.joints)
-    positions = without_invalid(positions, arrays)
+    positions, unmeasured = without_invalid(episode, positions, arrays)
     if options.units is None:
         _refuse_normalised(f"{where}: {episode}", positions, {**stated, **arrays}, keys)
     bare, units = without_units(names or known)
@@ -173,7 +177,7 @@ def recorded_among(
     others = {name: array for name, array in arrays.items() if name not in keys}
     called = (*keys, *(names or known))
     more["beside"] = arrays_beside(positions, others, clock.times, called)
-    more["remarks"] = (*more.get("remarks", ()), *why)
+    more["remarks"] = (*more.get("remarks", ()), *why, *unmeasured)
     if not bare:
         unclear = _other_names(episode, texts, positions.shape[1], options.joints or ())
         more["ambiguities"] = (*clock.ambiguities, *unclear)
@@ -325,16 +329,29 @@ def units_said(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
 
 def says_valid(name: str) -> bool:
     """Whether a flag is by its name 0 in frames that were not measured: `is_valid`, `tracked`."""
-    return _VALID.fullmatch(_STEMS.split(name.lower())[-1]) is not None
+    return _VALID.fullmatch(name.lower()) is not None
 
 
-def without_invalid(positions: Positions, flags: Arrays) -> Positions:
-    """Return a motion (T, D) that is nan in frames which a flag (T,) says were not measured."""
-    positions = positions.copy()
+def without_invalid(
+    episode: str, positions: Positions, flags: Arrays
+) -> tuple[Positions, tuple[str, ...]]:
+    """Return a motion (T, D) that is nan where a flag (T,) says it was not measured, and remarks.
+
+    InvalidDemonstrationsError if that is so in more frames than may be lost.
+    """
+    positions, remarks = positions.copy(), []
     for name, flag in flags.items():
         if says_valid(name) and flag.shape == positions.shape[:1] and np.all(np.isin(flag, (0, 1))):
-            positions[flag == 0] = np.nan
-    return positions
+            lost = flag == 0
+            what = f"{name} is 0 in {lost.sum()} of {len(lost)} frames, which calls them unmeasured"
+            if np.mean(lost) > MOST_LOST:
+                raise InvalidDemonstrationsError(
+                    f"episode {episode}: {what}; if it is of something else, rename it in the "
+                    "file, else drop that episode (--leave-out)"
+                )
+            positions[lost] = np.nan
+            remarks += [f"{what}: they are left out"] * bool(lost.any())
+    return positions, tuple(remarks)
 
 
 def other_count(where: str, declared: str, key: str, count: int) -> FileFormatError:
