@@ -119,3 +119,12 @@ def test_a_models_box_in_another_scale_is_no_box_of_that_object(view, ball):
     for per in ((1, SIZE[1] / SIZE[0]), (0.78, 0.78), (0.78, 1.39)):  # thousandths, pixels, order
         other = sighted(made, (box * np.tile(per, 2)).tolist())
         assert "model family" in doubts.misread(made, other, 0.06, round=True)
+
+
+def test_a_box_that_is_drawn_a_little_too_wide_is_none_in_another_scale():
+    """In a picture of 4 to 3 it is nearly as flat as that."""
+    pixels = seen(SIX, *ABOVE) + np.array([0, 120])
+    made = doubts.calibrate(SIX, pixels, picture=(1280, 960))
+    left, top, right, bottom = box_of([0.95, 0.1], 0.06, ABOVE, ball=True)
+    loose = sighted(made, (left - 3, top + 120, right + 3, bottom + 120))
+    assert doubts.misread(made, loose, 0.06, round=True) == ""

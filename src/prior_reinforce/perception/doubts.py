@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.perception.calibration import TableCalibration, left_out_errors
 from prior_reinforce.perception.viewpoint import least_miss, slope_at
+from prior_reinforce.perception.vlm import another_scale, sides_of
 from prior_reinforce.perception.vlm_reading import Sighting
 from prior_reinforce.units import UNITS, looks_like
 
@@ -40,9 +41,6 @@ apart. Ours: places are extrapolated there."""
 _FLAT, _TOLD = {"colour": 1.05, "model": 1.1}, {"colour": 1.1, "model": 1.2}
 """An object is flat whose box is at most so many times a flat disc's, where a ball's is at least so
 many times that (ours): a colour's is a pixel or two too large, a model's is drawn loosely."""
-_TOO_SMALL, _TOO_LARGE, _ALIKE = 0.85, 1.2, 1.15
-"""As of two objects in `vlm`: from where on one looks smaller or larger than it is, and up to which
-ratio as flat as the picture."""
 
 
 def calibrate(
@@ -189,9 +187,7 @@ def behind(
     """
     assert sighting.box is not None
     assert sighting.place is not None
-    left, top, right, bottom = sighting.box
-    disc, ball = calibration.seen(np.array([(left + right) / 2, (top + bottom) / 2]), size)
-    sides = np.array([right - left, bottom - top])
+    sides, disc, ball = sides_of(sighting.box, calibration, size)
     flat = (sides <= _FLAT[by] * disc).all() and (ball >= _TOLD[by] * disc).any()
     lift = 0.0 if flat else max(size / 2 - calibration.height, 0.0)
     off: Float[np.ndarray, "2"] = lift * np.abs(slope_at(calibration, sighting.place))
@@ -219,23 +215,9 @@ def misread(calibration: TableCalibration, sighting: Sighting, size: float, *, r
     """
     if sighting.box is None or calibration.picture is None:
         return ""
-    left, top, right, bottom = sighting.box
-    disc, ball = calibration.seen(np.array([(left + right) / 2, (top + bottom) / 2]), size)
-    sides = np.array([right - left, bottom - top])
-    small, large = (sides / disc).max(), (sides / ball).min()
-    shape, shapes = sides[0] / sides[1], sorted((1.0, disc[0] / disc[1]))
-    flat, wide = shape / np.clip(shape, *shapes), calibration.picture[0] / calibration.picture[1]
-    if small < _TOO_SMALL or large > _TOO_LARGE:
-        looks = f"{small if small < _TOO_SMALL else large:.2f} times as large as it is"
-    elif round and not _alike(wide, 1.0) and (_alike(flat, wide) or _alike(flat, 1 / wide)):
-        looks = "as flat as the picture"
-    else:
-        return ""
-    return (
+    wide, tall = calibration.picture
+    looks = another_scale([(sighting.box, size)], calibration, wide / tall, round)
+    return looks and (
         f"{sighting.words} looks {looks}: is the model family set right, does the server shrink "
         "pictures (then set max_image_side), is the size right?"
     )
-
-
-def _alike(one: float, other: float) -> bool:
-    return max(one / other, other / one) < _ALIKE

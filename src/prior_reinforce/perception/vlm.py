@@ -206,17 +206,7 @@ class VisionLanguageModel(Perception):
                 f"both boxes fit only with {reached.words} and {goal.words} exchanged: does the "
                 "model take one for the other, are the sizes right?"
             )
-        small, large, flat = np.array([_against(box, calibration, size) for box, size in found]).T
-        if small.max() < _TOO_SMALL and _alike(*small):
-            seen = f"{small[0]:.2f} and {small[1]:.2f} times as large as they are"
-        elif large.min() > _TOO_LARGE and _alike(*large):
-            seen = f"{large[0]:.2f} and {large[1]:.2f} times as large as they are"
-        elif not _alike(wide, tall) and any(
-            _alike(flat[0], shape) and _alike(flat[1], shape)
-            for shape in (wide / tall, tall / wide)
-        ):
-            seen = "as flat as the picture"
-        else:
+        if not (seen := another_scale(found, calibration, wide / tall)):
             return ""
         unsized = "is the picture as large as that in which the camera was calibrated, "
         return (
@@ -234,7 +224,7 @@ class VisionLanguageModel(Perception):
         assert reached.box is not None
         assert goal.box is not None
         found = [(reached.box, self.scene.reached.size), (goal.box, self.scene.goal.size)]
-        seen = [_sides(box, self._in(picture), size) for box, size in found]
+        seen = [sides_of(box, self._in(picture), size) for box, size in found]
         chance = np.array([_DRAWN * _step(picture) / ball for _, _, ball in seen])
         # No side of an object is above a ball's, and its longest is not below a flat disc's.
         least = np.array([(sides / ball).max() for sides, _, ball in seen])
@@ -363,26 +353,45 @@ def _shrunk(picture: Picture, config: VisionLanguageModelConfig) -> Picture:
     return np.asarray(image.resize(sent, Image.Resampling.LANCZOS))
 
 
+def another_scale(
+    found: list[tuple[Box, float]], calibration: TableCalibration, wide: float, round: bool = True
+) -> str:
+    """Say how objects look whose boxes are all read in another scale; nothing if they are not.
+
+    Each has a box [px] and a size [m]; the picture is so many times as wide as high. One that is
+    not `round` may be as flat as that itself.
+    """
+    small, large, flat = np.array([_against(box, calibration, size) for box, size in found]).T
+    sizes = small if small.max() < _TOO_SMALL else large
+    if _alike(*sizes) and (small.max() < _TOO_SMALL or large.min() > _TOO_LARGE):
+        times = " and ".join(f"{times:.2f}" for times in sizes)
+        return f"{times} times as large as {'they are' if len(found) > 1 else 'it is'}"
+    # One box may be as flat by chance, where the picture is hardly flatter than boxes are loose.
+    tells = not _alike(wide, 1.0) if len(found) > 1 else max(wide, 1 / wide) > _LOOSE * _ALIKE
+    alike = any(all(_alike(each, shape) for each in flat) for shape in (wide, 1 / wide))
+    return "as flat as the picture" if round and tells and alike else ""
+
+
 def _against(box: Box, calibration: TableCalibration, size: float) -> tuple[float, float, float]:
     """How a box is to one of an object of this size [m] that lies there: larger, and flatter.
 
     That is how many times a flat disc's, a ball's, and how far between the two shapes; 1 if so.
     """
-    sides, disc, ball = _sides(box, calibration, size)
+    sides, disc, ball = sides_of(box, calibration, size)
     shape, shapes = sides[0] / sides[1], sorted((1.0, disc[0] / disc[1]))
     return (sides / disc).max(), (sides / ball).min(), shape / np.clip(shape, *shapes)
 
 
 def _misfit(box: Box, calibration: TableCalibration, size: float) -> float:
     """How many times a side is above a ball's of this size [m] there, or below a flat disc's."""
-    sides, disc, ball = _sides(box, calibration, size)
+    sides, disc, ball = sides_of(box, calibration, size)
     return max((sides / ball).max(), (disc / sides).max())
 
 
-def _sides(
+def sides_of(
     box: Box, calibration: TableCalibration, size: float
 ) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2"], float]:
-    """Width and height of a box, of a flat disc of this size [m] there, and the side of a ball."""
+    """Return the sides of a box, of a flat disc's of this size [m] there, and a ball's, in [px]."""
     left, top, right, bottom = box
     middle = np.array([(left + right) / 2, (top + bottom) / 2])
     return np.array([right - left, bottom - top]), *calibration.seen(middle, size)
@@ -397,7 +406,7 @@ def _off(
     is shorter than the other (where the object is round) what is hidden; one that is longer than
     boxes are drawn loosely is around something else, too.
     """
-    sides, disc, ball = _sides(box, calibration, wanted.size)
+    sides, disc, ball = sides_of(box, calibration, wanted.size)
     ends, border = np.reshape(box, (2, 2)), np.array(picture.shape[1::-1]) - _step(picture)
     cut = (ends[0] <= _step(picture)) | (ends[1] >= border)
     whole = min((sides / disc).max(), 1.0) * disc  # as large as the longer side says
@@ -426,8 +435,8 @@ def _fits_better(swapped: list[float], read: list[float], *, by: float = _LOOSE)
     return max(swapped) <= _LOOSE and better
 
 
-def _alike(one: float, other: float) -> bool:
-    return max(one / other, other / one) < _ALIKE
+def _alike(*ratios: float) -> bool:
+    return max(ratios) / min(ratios) < _ALIKE
 
 
 def _centres(boxes: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n 2"]:
