@@ -221,12 +221,14 @@ _DENIED = re.compile(
     re.IGNORECASE,
 )
 _OF_OTHERS = re.compile(
-    r"(?:\bno|\bnot|n['’]t)(?: (?:see|find|have|any))* (?:others?|problem|doubt)\b|没有其[他它]"
+    r"(?:\bno|\bnot|n['’]t)(?: (?:see|find|have|any|be|partly|partially))* (?:others?|problem|doubt"
+    r"|occlu\w{1,6}|obstruct\w{1,6}|obscured|hidden|cut|moving|perfectly|pixels?)\b|没有其[他它]"
     r"|\bnot (?:to be \w{1,9} (?:with|for) )?(?:the|an?) "
     r"(?!(?:object|target|thing|one|right|correct)\b)(?P<thing>[^.,;:]{1,80})",
     re.IGNORECASE,
 )
-"""Denials that are of other objects, unless the thing is the one that was asked for."""
+"""Denials that are of other objects, unless the thing is the one that was asked for, or that say
+nothing against a box."""
 _FLAG = re.compile(
     r"[\"'](?:is_)?(?:present|found|visible|exists?|detected|confidence|score)[\"'] ?: ?"
     r"[\"']?(?:false|no|low|0?\.[0-4]\d{0,20}|0(?:\.0{1,20})?)(?![\w.])",
