@@ -46,8 +46,8 @@ def test_pieces_belong_together_and_specks_do_not():
     assert find_by_colour(table(((280, 5, 283, 8), RED)), "the red hoop") is None
 
 
-@pytest.mark.parametrize("words", ["Orange ball", "the ORANGE one"])
-def test_a_colour_may_begin_a_sentence(words):
+@pytest.mark.parametrize("words", ["Orange ball", "the ORANGE one", "the bright orange ball"])
+def test_a_colour_may_begin_a_sentence_and_be_bright(words):
     box = (200, 150, 215, 170)
     assert find_by_colour(table((box, ORANGE)), words) == box
 

@@ -31,7 +31,7 @@ COLOURS = {
 """Least and greatest hue in degrees, and least saturation, of each colour that is told apart
 (ours). Table, floor, arm and shadows of our scenes are all paler."""
 
-_SHADES = "light|pale|bright|dark|deep|navy|sky|not|no|non|without"
+_SHADES = "light|pale|dark|deep|navy|sky|not|no|non|without"
 """Words before a colour that make it another one than is found."""
 _DARKEST = 60
 """Least value of a pixel whose hue means anything, of 255 (ours)."""
