@@ -703,10 +703,10 @@ def test_which_model_looks_may_stand_in_the_workspaces_manifest(drawn_table, cap
 
 
 def test_a_column_z_is_the_points_height(tmp_path, run):
-    for name in ("z", "height", "z [m]"):
+    for name, rough in (("z", 0.0), ("height", 0.0), ("z [m]", 0.0), ("z", 0.001)):
         high = points_file(
             tmp_path / "points.csv",
-            [(x, y, 0.3, u, v) for x, y, u, v in POINTS],
+            [(x, y, 0.3 + rough * (i % 2), u, v) for i, (x, y, u, v) in enumerate(POINTS)],
             ("x", "y", name, "u", "v"),
         )
         status, out, _ = run("calibrate", high, "--out", tmp_path / "table.json")

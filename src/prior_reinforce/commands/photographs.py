@@ -38,6 +38,8 @@ _ROUND = re.compile(r"\s*\((.*)\)$")
 """`x (ft)`."""
 _HEIGHTS = {"height": "z", "h": "z"}
 """Other names of a column z."""
+_LEVEL = 0.01
+"""Heights of points that differ by less are one, in [m]; ours: as an arm's tip measures them."""
 _EXPOSURE = 10
 """Frames, of which the last is kept; ours: the first are dark until a webcam has set itself."""
 _SAME_GOAL, _OTHER_GOAL = 0.02, 0.06
@@ -400,10 +402,12 @@ def _read_points(
             )
     rows = table.rows([i for i in range(len(table)) if any(table.cells[c][i] for c in at)])
     points = rows.columns(at) * np.array(scale, float)
-    heights = np.unique(points[:, 4:])
-    if len(heights) > 1:
+    if len(columns) == len(_COLUMNS) or not len(points):
+        return points[:, :2], points[:, 2:4], None
+    heights = points[:, 4]
+    if np.ptp(heights) > _LEVEL:
         raise FileFormatError(
-            f"{path}: points are {heights[0]:g} to {heights[-1]:g} m high, but a calibration is of "
-            "one plane; give those of one height"
+            f"{path}: points are {heights.min():g} to {heights.max():g} m high, but a calibration "
+            "is of one plane; give those of one height"
         )
-    return points[:, :2], points[:, 2:4], float(heights[0]) if len(heights) else None
+    return points[:, :2], points[:, 2:4], float(np.median(heights))
