@@ -181,9 +181,8 @@ class InUse:
         """The next trial, its plan and verdict: as wanted, or the last that passes towards that.
 
         OutOfReachError if plans do not reach the goal, and this one was tried and missed, unless it
-        may be repeated;
-        RobotLimitError if it does not pass, and the goal's own plan does not either, or the last
-        that passes was tried and missed.
+        may be repeated; RobotLimitError if it does not pass, and the goal's own plan does not
+        either, or the last that passes was tried and missed.
         """
 
         def check(plan: Frames, condition: Point) -> str:
@@ -202,7 +201,7 @@ class InUse:
                 raise
             nearest = farthest_between(generator, goal, wanted, check)
             if n := _missed(state, nearest):
-                said = f"{error}; trial {n} went as far as passes, and missed: {nearer}"
+                said = f"{error.problem}; trial {n} went as far as passes, and missed: {nearer}"
                 raise RobotLimitError(said) from error
             (plan,) = generator.generate(nearest[None])
             own = error.__cause__  # the verdict's

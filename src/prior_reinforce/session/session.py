@@ -397,8 +397,8 @@ class Session:
 
     def _verdict(self, plan: Frames, condition: Point, refusal: str) -> Verdict | None:
         """What the gate says of a plan; an error that begins with `refusal` if it refuses."""
-        verdict = None if self._gate is None else self._gate(plan, condition)
         try:
+            verdict = None if self._gate is None else self._gate(plan, condition)
             if verdict is not None:
                 verdict.require()
         except RobotLimitError as error:
