@@ -720,6 +720,13 @@ def test_a_column_z_is_the_points_height(tmp_path, run):
     assert "give those of one height" in err
 
 
+def test_a_height_beside_a_width_is_the_pictures(tmp_path, run):
+    rows = [(*row, 1280, 720) for row in POINTS]
+    path = points_file(tmp_path / "points.csv", rows, (*"xyuv", "width", "height"))
+    status, out, _ = run("calibrate", path, "--out", tmp_path / "table.json")
+    assert (status, "plane 0.0 cm above the table" in out) == (0, True)
+
+
 def test_columns_of_two_cameras_are_refused(tmp_path, run):
     both = [(*row, 1, 2) for row in POINTS]
     points = points_file(tmp_path / "points.csv", both, ("x", "y", "u", "v", "u", "v"))

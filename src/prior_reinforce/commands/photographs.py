@@ -86,9 +86,10 @@ class Calibrate:
                 f"{self.height:g}; leave one away"
             )
         height = self.height if self.height is not None else stated or 0.0
-        for name, above in (("height", height), ("outcome-height", self.outcome_height)):
+        said = "--height" if stated is None else f"column z of {self.points}"
+        for name, above in ((said, height), ("--outcome-height", self.outcome_height)):
             if above is not None and looks_like("m", above):
-                raise ConfigurationError(f"--{name} must be metres above the table, got {above}")
+                raise ConfigurationError(f"{name} must be metres above the table, got {above}")
         if (self.camera is None) != (self.outcome_height is None):
             raise ConfigurationError(
                 "--outcome-height needs --camera X Y Z, in metres, and that serves for it only"
@@ -378,7 +379,9 @@ def _read_points(
     table = read_table(path, head=_COLUMNS)
     heads = [_IN_PIXELS.sub(r"\1 [px]", name.strip()) for name in table.names]
     split = [split_unit(_ROUND.sub(r" [\1]", name), any_word=True) for name in heads]
-    names = [_HEIGHTS.get(name.lower(), name.lower()) for name, _ in split]
+    names = [name.lower() for name, _ in split]
+    if not {"width", "w"} & {*names}:  # beside it, a height is the picture's
+        names = [_HEIGHTS.get(name, name) for name in names]
     if missing := {*_COLUMNS} - {*names}:
         raise FileFormatError(
             f"{path} has no column {min(missing)}; expected a CSV (save a spreadsheet as one) with "
@@ -402,9 +405,9 @@ def _read_points(
             )
     rows = table.rows([i for i in range(len(table)) if any(table.cells[c][i] for c in at)])
     points = rows.columns(at) * np.array(scale, float)
-    if len(columns) == len(_COLUMNS) or not len(points):
+    heights = points[:, 4:][np.isfinite(points[:, 4:])]
+    if not len(heights):
         return points[:, :2], points[:, 2:4], None
-    heights = points[:, 4]
     if np.ptp(heights) > _LEVEL:
         raise FileFormatError(
             f"{path}: points are {heights.min():g} to {heights.max():g} m high, but a calibration "
