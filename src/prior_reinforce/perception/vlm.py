@@ -361,7 +361,11 @@ def another_scale(
     Each has a box [px] and a size [m]; the picture is so many times as wide as high. One that is
     not `round` may be as flat as that itself.
     """
-    small, large, flat = np.array([_against(box, calibration, size) for box, size in found]).T
+    seen = zip(*(sides_of(box, calibration, size) for box, size in found), strict=True)
+    sides, discs, balls = map(np.array, seen)
+    small, large = (sides / discs).max(axis=1), (sides / balls[:, None]).min(axis=1)
+    shapes, of_discs = (each[:, 0] / each[:, 1] for each in (sides, discs))  # a ball's is 1
+    flat = shapes / np.clip(shapes, np.minimum(of_discs, 1.0), np.maximum(of_discs, 1.0))
     sizes = small if small.max() < _TOO_SMALL else large
     if _alike(*sizes) and (small.max() < _TOO_SMALL or large.min() > _TOO_LARGE):
         times = " and ".join(f"{times:.2f}" for times in sizes)
@@ -370,16 +374,6 @@ def another_scale(
     tells = not _alike(wide, 1.0) if len(found) > 1 else max(wide, 1 / wide) > _LOOSE * _ALIKE
     alike = any(all(_alike(each, shape) for each in flat) for shape in (wide, 1 / wide))
     return "as flat as the picture" if round and tells and alike else ""
-
-
-def _against(box: Box, calibration: TableCalibration, size: float) -> tuple[float, float, float]:
-    """How a box is to one of an object of this size [m] that lies there: larger, and flatter.
-
-    That is how many times a flat disc's, a ball's, and how far between the two shapes; 1 if so.
-    """
-    sides, disc, ball = sides_of(box, calibration, size)
-    shape, shapes = sides[0] / sides[1], sorted((1.0, disc[0] / disc[1]))
-    return (sides / disc).max(), (sides / ball).min(), shape / np.clip(shape, *shapes)
 
 
 def _misfit(box: Box, calibration: TableCalibration, size: float) -> float:
