@@ -86,8 +86,8 @@ class Calibrate:
                 f"{self.height:g}; leave one away"
             )
         height = self.height if self.height is not None else stated or 0.0
-        said = "--height" if stated is None else f"column z of {self.points}"
-        for name, above in ((said, height), ("--outcome-height", self.outcome_height)):
+        of_points = "--height" if stated is None else f"column z of {self.points}"
+        for name, above in ((of_points, height), ("--outcome-height", self.outcome_height)):
             if above is not None and looks_like("m", above):
                 raise ConfigurationError(f"{name} must be metres above the table, got {above}")
         if (self.camera is None) != (self.outcome_height is None):
