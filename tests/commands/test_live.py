@@ -19,6 +19,7 @@ from prior_reinforce.errors import WorkspaceError
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.generators.base import FitProgress
 from prior_reinforce.readings import Reading
+from prior_reinforce.session.trials import Stage
 from prior_reinforce.simulation.protocol import GoalTrials
 from tests.report.swing_world import told as record
 
@@ -33,6 +34,7 @@ def trial(number, condition, error_seen, hit=False, p_hit=None):
         condition=np.array(condition),
         reading=Reading.measured(error_seen) if error_seen else Reading.only(hit, 2),
         hit=hit,
+        stage=Stage.TOLD,
         expected=Expectation(p_hit),
     )
 
