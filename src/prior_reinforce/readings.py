@@ -45,9 +45,9 @@ _SAME = 1e-9
 """Numbers are compared to the nanometre."""
 _MEASURED = 0.5
 """A number with an sd below this share of the tolerance is more informative than a hit (ours)."""
-
-_NOISE_SDS = 2.0
-"""Standard deviations of a reading within which it leaves a hit possible (ours)."""
+NOISE_SDS = 2.0
+"""Standard deviations of a reading within which it leaves a hit possible (ours): only then a miss
+says more than its reading, where words are coarse, or numbers noisy."""
 
 
 class ReadingRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -250,7 +250,7 @@ class Reading:
 
     def _is_sure_miss(self, radius: Point) -> bool:
         """Whether the intervals, with their noise, are all outside of the tolerance."""
-        beyond = np.maximum(np.maximum(self.low, -self.high) - _NOISE_SDS * self.sd, 0.0)
+        beyond = np.maximum(np.maximum(self.low, -self.high) - NOISE_SDS * self.sd, 0.0)
         return float(np.linalg.norm(beyond / radius)) > 1.0
 
     def record(self) -> ReadingRecord:

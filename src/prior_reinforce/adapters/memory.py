@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float, Int
 from typing_extensions import Self
 
 from prior_reinforce.arrays import Point, Points
+from prior_reinforce.readings import NOISE_SDS
 
 AGAIN = 0.5
 """A condition closer than this share of the tolerance to one that missed the same goal would be
@@ -22,9 +23,6 @@ LATEST = 8
 """The latest trials, which are never forgotten, and whose misses count for themselves (ours)."""
 _KEPT = 64
 """Trials in memory before one is forgotten for each that comes (ours)."""
-_BLUR = 2.0
-"""Standard deviations of a reading within which it leaves a hit possible (ours): only then a miss
-says more than its reading, where words are coarse, or numbers noisy."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +76,7 @@ class Memory(Places):
         which = which[which >= len(self.numbers) - LATEST]
         latest, hits = self.only(which), hits[which]
         beyond = np.maximum(latest.low - hits, hits - latest.high)
-        beyond = np.maximum(beyond - _BLUR * np.sqrt(latest.variance), 0.0)
+        beyond = np.maximum(beyond - NOISE_SDS * np.sqrt(latest.variance), 0.0)
         return latest.only(np.linalg.norm(beyond / latest.missed_by, axis=1) < 1.0)
 
     def followed_by(self, others: Memory) -> Memory:

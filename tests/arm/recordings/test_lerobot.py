@@ -67,7 +67,9 @@ def test_lerobot_without_a_list_of_episodes_is_read_by_its_frames(tmp_path):
 def test_tasks_of_a_data_set_that_holds_several_are_told(tmp_path, version):
     folder = write_lerobot(tmp_path / "set", version=version)
     assert not any("task" in one for r in read_recordings(folder) for one in r.remarks)
-    tasks = [["throw"] if i < 4 else ["reset the table"] for i in range(N)]
+    tasks = ["throw" if i < 4 else "reset the table" for i in range(N)]
+    if version == "v3.0":  # a list of each, as LeRobot writes them; and plain, as some writers do
+        tasks = [[task] for task in tasks]
     if version == "v3.0":
         (path,) = folder.glob("meta/episodes/**/*.parquet")
         table = parquet.read_table(path).drop_columns("tasks")

@@ -59,7 +59,7 @@ def test_texts_that_contradict_each_other_are_refused():
             },
             ("rad", "deg", "mm"),
         ),
-        ({"units.lift": ("deg",), "units.pan": ("rad",)}, (None,) * 3),
+        ({"units.lift": ("deg",), "units.pan": ("rad",)}, ("rad", "deg", None)),
     ],
 )
 def test_units_in_words_are_of_the_columns(texts, units):

@@ -181,7 +181,8 @@ def _listed(source: Path) -> tuple[dict[int, int], dict[int, str]]:
             for row in rows:
                 number = int(row["episode_index"])
                 lengths[number] = int(row["length"])
-                tasks[number] = ", ".join(map(str, row.get(_TASKS) or ["not said"]))
+                said = row.get(_TASKS) or "not said"
+                tasks[number] = said if isinstance(said, str) else ", ".join(map(str, said))
     return lengths, tasks
 
 

@@ -312,8 +312,8 @@ def names_said(
 def units_said(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
     """Return the unit of each column as texts state it; a single one for all that can be in it."""
     by_name = {key.rpartition(".")[2]: own for key, own in texts.items() if _IN_UNITS.search(key)}
-    if {*names} <= by_name.keys():  # {"units": {"elbow": "deg", ...}}
-        texts = {"units": tuple(by_name[name][0] for name in names)}
+    if {*names} & by_name.keys():  # {"units": {"elbow": "deg", ...}}
+        texts = {"units": tuple(by_name.get(name, ("",))[0] for name in names)}
     for key, own in texts.items():
         if "unit" not in key.lower() or says_time(key) or len(own) not in (1, len(names)):
             continue

@@ -153,13 +153,8 @@ class Workspace:
     @property
     def state(self) -> WorkspaceState:
         """What the journal adds up to."""
-        state, form = self.log.state(), self.manifest.outcome_format
-        known = state.goals[-1].format if state.goals else form
-        if (form.names, form.units) != (known.names, known.units):
-            raise ConfigurationError(
-                f"{self.folder / MANIFEST_FILE} says that outcomes are {form}, but goals were set "
-                f"in {known}; put it back, or make another workspace"
-            )
+        state = self.log.state()
+        self._check_outcomes(state)
         return state
 
     @property
@@ -177,9 +172,19 @@ class Workspace:
         """The model in use; a WorkspaceError where there is none, or it is stale."""
         return self.store.model(self.standing.trained.model)
 
+    def _check_outcomes(self, state: WorkspaceState) -> None:
+        """ConfigurationError if goals were set in other outcomes than the manifest's of now."""
+        form = self.manifest.outcome_format
+        known = state.goals[-1].format if state.goals else form
+        if (form.names, form.units) != (known.names, known.units):
+            raise ConfigurationError(
+                f"{self.folder / MANIFEST_FILE} says that outcomes are {form}, but goals were set "
+                f"in {known}; put it back, or make another workspace"
+            )
+
     def session(self) -> Session:
         """The trials of this workspace. Telling needs no model; asking loads it."""
-        _ = self.state  # or refuse: a reading means the manifest's outcomes
+        self._check_outcomes(self.log.state())  # a reading means the manifest's outcomes
         return Session(
             lambda: self.model,
             lambda: make_adapter(getattr(self.state.goal, "adapter", DEFAULT_ADAPTER)),
