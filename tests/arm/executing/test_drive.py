@@ -27,6 +27,7 @@ from prior_reinforce.arm.executing.drive import (
 from prior_reinforce.arm.robots.gate_settings import GateSettings
 from prior_reinforce.arm.robots.limits import RobotLimits
 from prior_reinforce.arm.robots.plan_files import write_plan
+from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
@@ -340,6 +341,34 @@ def test_a_request_survives_its_way_through_the_command_line(arm):
     again = msgspec.json.decode(msgspec.json.encode(request), type=Request)
     assert again == request
     assert sys.executable in drive_command(request)
+
+
+def test_an_arm_that_stands_at_whole_numbers_gets_the_whole_plan(arm, monkeypatch):
+    """A plan that is laid into a pose of integers would be cut to whole radians."""
+    monkeypatch.setattr(toy_arm.ToyArm, "where", lambda self: [0, 0])
+    assert arm.drive().outcome == "done"
+    assert arm.pose() == pytest.approx([1.0, 0.4])
+    assert arm.path()[1][12] == pytest.approx(PLAN.actions[6], abs=0.01)
+
+
+@pytest.mark.parametrize("pose", [[0.0], [[0.0, 0.0]], 0.0])
+def test_an_arm_that_stands_in_another_number_of_joints_is_not_moved(arm, monkeypatch, pose):
+    monkeypatch.setattr(toy_arm.ToyArm, "where", lambda self: pose)
+    result = arm.drive()
+    assert result.outcome == "not_moved"
+    assert "where each of joint1, joint2 stands" in result.reason
+    assert arm.motions() == 0
+
+
+def test_an_arm_of_another_model_than_the_workspaces_is_not_moved(arm, monkeypatch):
+    arm.limits = robot_limits("ur5e")
+    model = replace(ARM, model="ur10e")
+    monkeypatch.setattr(toy_arm.ToyArm, "describe", lambda self: model)
+    result = arm.drive()
+    assert result.outcome == "not_moved"
+    assert "driven as a ur10e" in result.reason
+    assert "is ur5e: name the same one" in result.reason
+    assert arm.motions() == 0
 
 
 def test_an_arm_that_does_not_say_where_a_joint_stands_is_not_moved(arm):

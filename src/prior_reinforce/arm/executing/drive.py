@@ -42,6 +42,7 @@ from prior_reinforce.arm.robots.gate import check_plan
 from prior_reinforce.arm.robots.gate_settings import GateSettings
 from prior_reinforce.arm.robots.limits import RobotLimits, joint_of, with_turns
 from prior_reinforce.arm.robots.plan_files import read_plan
+from prior_reinforce.arm.robots.presets import PRESETS
 from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
@@ -219,14 +220,34 @@ def say_distance(
     return f"the arm is {', '.join(said)}", there
 
 
+def _pose(executor: Executor, arm: ArmDescription) -> Float[np.ndarray, " d"]:
+    """Where an arm stands, as floats: a pose of whole numbers would round what is put into it.
+
+    ConfigurationError if it does not give a finite number for each of its channels.
+    """
+    pose = np.asarray(executor.where(), dtype=np.float64)
+    if pose.shape != (len(arm.columns),):
+        raise ConfigurationError(
+            f"{arm.model} must say where each of {', '.join(arm.columns)} stands, got {pose}"
+        )
+    if missing := [n for n, q in zip(arm.columns, pose, strict=True) if not math.isfinite(q)]:
+        raise ConfigurationError(f"{arm.model} does not say where {', '.join(missing)} stands")
+    return pose
+
+
 class _Prepared:
     """A plan in an arm's columns, and how the arm stands to it; nothing moves here."""
 
     def __init__(self, executor: Executor, plan: Plan, request: Request) -> None:
         self._executor, self._request, self._form = executor, request, plan.format
-        arm, pose = executor.describe(), executor.where()
-        if missing := [n for n, q in zip(arm.columns, pose, strict=True) if not math.isfinite(q)]:
-            raise ConfigurationError(f"{arm.model} does not say where {', '.join(missing)} stands")
+        arm = executor.describe()
+        pose = _pose(executor, arm)
+        robot = arm.model if request.limits is None else request.limits.robot
+        if arm.model != robot and {arm.model, robot} <= {*PRESETS}:
+            raise ConfigurationError(
+                f"the arm is driven as a {arm.model}, but the robot in workspace.toml is {robot}: "
+                "name the same one in [robot] and in [arm]"
+            )
         self.arm, self._pose, self.channels = arm, pose, arms_columns(plan.format, arm)
         """The arm, where it stands, and its channel of each of the plan's columns."""
         form = with_turns(plan.format, request.limits)

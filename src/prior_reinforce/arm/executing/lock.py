@@ -15,6 +15,7 @@ from __future__ import annotations
 import errno
 import hashlib
 import os
+import re
 import signal
 import socket
 import sys
@@ -109,7 +110,9 @@ def programs_executing(folder: Path) -> list[tuple[int, str]]:
         with suppress(OSError):  # it ended meanwhile
             words = Path("/proc", str(pid), "cmdline").read_bytes().split(b"\0")
             if not any(word.endswith(b"supervisor.py") for word in words):
-                found.append((pid, os.fsdecode(b" ".join(words)).strip()))
+                line = os.fsdecode(b" ".join(words)).strip()
+                own = re.search(r" -c import sys; .*import (\S+);", line)  # see `drive.program`
+                found.append((pid, f"python -m {own[1]}" if own else line))
     return found
 
 

@@ -81,7 +81,7 @@ class UR(Executor):
         except RuntimeError as error:
             raise ConfigurationError(
                 f"cannot reach the robot at {config.host} ({error}); switch it on, and see that "
-                "RTDE is not disabled in its security settings"
+                "this is its address and RTDE is not disabled in its security settings"
             ) from error
 
     def describe(self) -> ArmDescription:
