@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 import tyro
 
+from prior_reinforce.arm.workspace.execute import recover
 from prior_reinforce.arm.workspace.state import Standing
 from prior_reinforce.arm.workspace.text import (
     call,
@@ -108,6 +109,7 @@ class Tell(Seen):
     """
 
     def _run_on(self, workspace: Workspace, words: tuple[str, ...]) -> None:
+        recover(workspace)
         number, seen, hit = self.read(workspace, words)
         _warn_of_its_execution(workspace.standing, number)
         trial = workspace.session().tell(number, seen, hit=hit)
@@ -157,6 +159,7 @@ class Void(OnWorkspace):
         number, rest = trial_and_rest(workspace, words)
         if rest:
             raise ConfigurationError(f"unexpected {rest[0]!r}; say why with --reason")
+        recover(workspace)
         trial = workspace.session().void(number, self.reason)
         now = workspace.standing
         undo = "; amend it to tell it again" if trial.told_before else ""

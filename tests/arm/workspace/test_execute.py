@@ -317,8 +317,33 @@ def test_a_plan_runs_once_and_told_while_it_runs_the_trial_stays_told(workspace,
     command = f"{sys.executable} {tmp_path}/tell.py {workspace.folder} {{plan}}"
     assert execute(workspace, number, command, time_limit=60).succeeded
     assert workspace.state.trial(number).stage is Stage.TOLD
+    assert workspace.state.executions[number].outcome == "done"  # noted, as of any motion
     with pytest.raises(TrialStateError, match="told already; a plan runs once"):
         execute(workspace, number, command, time_limit=60)
+
+
+@pytest.mark.parametrize("verb", ["tell", "void"])
+def test_a_motion_that_fails_after_its_trial_was_settled_is_noted_as_aborted(
+    workspace, tmp_path, verb
+):
+    number = ask(workspace).number
+    settle = {"tell": "tell(1, [0.05, 0.0])", "void": "void(1)"}[verb]
+    text = TELLING.replace("tell(1, [0.05, 0.0])", settle)
+    assert settle in text
+    (tmp_path / "settle.py").write_text(f"{text}\nsys.exit(3)")
+    command = f"{sys.executable} {tmp_path}/settle.py {workspace.folder} {{plan}}"
+    assert execute(workspace, number, command, time_limit=60).outcome == "aborted"
+    workspace = reopened(workspace)
+    ended = workspace.state.executions[number]
+    assert (ended.outcome, ended.exit_status) == ("aborted", 3)
+    assert "but aborted" in workspace.status().trials[-1].warning
+    assert workspace.state.trial(number).stage.value == ("told" if verb == "tell" else "voided")
+
+
+def test_nobody_can_say_that_the_arm_did_not_move_for_no_trial(workspace):
+    tell(workspace, ask(workspace).number, [0.02, 0.0])
+    with pytest.raises(TrialStateError, match="no trial waits"):
+        note_not_moved(workspace)
 
 
 @pytest.fixture

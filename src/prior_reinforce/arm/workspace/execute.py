@@ -186,12 +186,14 @@ def recover(workspace: Workspace) -> Trial | None:
 def note_not_moved(workspace: Workspace) -> None:
     """Note what a person saw of the open trial: the arm did not move, so it may be executed.
 
-    TrialStateError if it is executing now, or was executed to its end.
+    TrialStateError if none is open, or it is executing now, or was executed to its end.
     """
     with workspace.log.exclusive():
         now = workspace.standing
         trial = now.state.open_trial
-        if trial is None or now.state.stage(trial) == "asked":
+        if trial is None:
+            raise TrialStateError("no trial waits that the arm did not move for; ask without that")
+        if now.state.stage(trial) == "asked":
             return
         if now.moving:
             raise TrialStateError(f"trial {trial.number} is executing now; wait for it")
@@ -258,7 +260,9 @@ def _command(
 
 def _another_arm(workspace: Workspace) -> ConfigurationError:
     path = workspace.folder / MANIFEST_FILE
-    return ConfigurationError(f"{path} names another arm since; ask again")
+    return ConfigurationError(
+        f"{path} names another arm since; ask again (console: start it again)"
+    )
 
 
 def _begin(workspace: Workspace, event: Moving) -> None:
@@ -269,11 +273,10 @@ def _begin(workspace: Workspace, event: Moving) -> None:
 
 
 def _end(workspace: Workspace, event: Moved) -> None:
-    """Note how the motion ended, unless the trial that it executed was told meanwhile."""
+    """Note how the motion ended, even of a trial that was told or voided meanwhile; once."""
     with workspace.log.exclusive():
-        state = workspace.state
-        stage = state.stage(state.trial(event.trial))
-        if event.motion != "trial" or stage == "executing":
+        latest = workspace.state.executions.get(event.trial)
+        if event.motion != "trial" or isinstance(latest, Moving):
             workspace.log.append(event)
 
 

@@ -121,7 +121,7 @@ class WorkspaceState(SessionState):
     def _move(self, event: Moving | Moved) -> None:
         number = self.trial(event.trial).number
         if event.motion == "trial":
-            if not self.trial(number).open:
+            if isinstance(event, Moving) and not self.trial(number).open:
                 raise ValueError(f"trial {number} is not open")
             self.executions[number] = event
         self.moves[number] = event
