@@ -207,6 +207,15 @@ def test_plain_settings_are_read_by_their_annotations(add):
 
 
 @dataclass(frozen=True)
+class NamedConfig:
+    fault: str = ""
+
+
+def test_a_text_may_be_the_word_none():
+    assert build(NamedConfig, {"fault": "none"}).fault == "none"
+
+
+@dataclass(frozen=True)
 class WovenConfig:
     threads: tuple[int, ...] = (4, 4)
     angles: tuple[float, float] | None = None

@@ -246,7 +246,7 @@ def _plain(taker: Callable[..., Any], settings: Mapping[str, Any], choice: str) 
                 **whole,
                 **_plain(cast(type[Any], hint), {inner: value}, f"{choice}, {outer},"),
             }
-        elif value in ("none", "None"):
+        elif value in ("none", "None") and hint is not str:
             plain[outer] = None
         elif isinstance(value, str) and tuple in kinds:
             plain[outer] = value.split(":")

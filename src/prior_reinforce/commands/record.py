@@ -118,6 +118,8 @@ class Record(OnWorkspace):
             if session.open is not None:
                 session.discard()
         if not session.taken:
+            with suppress(OSError):
+                folder.rmdir()
             raise InvalidDemonstrationsError("nothing was recorded; record again")
         options = ReadOptions(format="npz", units=manifest.format.units)
         words = (str(workspace.folder), str(folder))

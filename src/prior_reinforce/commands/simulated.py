@@ -130,7 +130,7 @@ class Adapt(_Reaching, OnTask):
     """Reach new goals on a simulated task, trial by trial (Stage 2), and write the report.
 
     For example:
-        prior-reinforce adapt --task curling --goal 1.9 0.1
+        prior-reinforce adapt --task curling --goal 0.92 0.05
     """
 
     goal: tuple[str, ...] = ("random",)
@@ -219,6 +219,8 @@ class Adapt(_Reaching, OnTask):
         records: list[AdaptationRecord] = []
         for i, goal in enumerate(goals, start=1):
             view.goal(i, len(goals), goal)
+            if far := session.demonstrations.say_far_outside(goal):
+                say(console, far)
             seed = self.seed + i - 1
             eyes = recording(perception, self.out / SEEN, f"goal{i}-trial")
             session.set_goal(goal, task.tolerance)
