@@ -205,17 +205,17 @@ def test_what_a_demonstration_would_teach_is_what_adding_it_takes_off():
     new = np.array([[0.9, 0.1], [1.05, 0.25], [0.801, 0.2]])  # the last beside another
     adapter = started()
     gains = adapter.gain(new, places, demonstrations=True)
-    before = adapter._trials._unknown(
-        adapter._trials._places(*[adapter._trials._normalisation.apply(places)] * 2)
+    before = adapter._trials._mean_variance(
+        adapter._trials._inputs(*[adapter._trials._normalisation.apply(places)] * 2)
     )
     for one, gain in zip(new, gains, strict=True):
         more = started(np.vstack([CORNERS, one]))
         same = adapter._trials._normalisation  # a seventh changes the spread a little
         more._trials._prior.normalisation = more._trials._normalisation = same
-        more._trials._prior._mix(
+        more._trials._prior._set_demonstrations(
             same.apply(np.vstack([CORNERS, one])), np.zeros((7, 2)), np.zeros((7, 2))
         )
-        after = more._trials._unknown(more._trials._places(*[same.apply(places)] * 2))
+        after = more._trials._mean_variance(more._trials._inputs(*[same.apply(places)] * 2))
         assert gain == pytest.approx(1 - after / before, abs=1e-9)
 
 
@@ -245,7 +245,7 @@ def test_a_generator_that_is_wrong_in_its_own_ways_is_not_taken_for_labels():
     rng = np.random.default_rng(4)
     for condition in rng.uniform(CORNERS.min(axis=0), CORNERS.max(axis=0), size=(20, 2)):
         adapter.observe(condition, condition, Reading.measured(moved(condition), 0.002))
-    greater = adapter._trials._prior._square > 0.1**2
+    greater = adapter._trials._prior.generator_variance > 0.1**2
     weights = adapter._trials._histories[0].posterior.model_weights
     assert np.all(weights[greater].sum(axis=0) > 0.99)
 
@@ -256,7 +256,7 @@ def test_one_component_may_be_far_off_where_the_other_is_not():
         off = 0.15 * (condition[1] / 0.2) ** 2
         adapter.observe(condition, condition, Reading.measured([off, 0.0], 0.001))
     weights = adapter._trials._histories[0].posterior.model_weights
-    of_greater = weights[adapter._trials._prior._square > 0.1**2].sum(axis=0)
+    of_greater = weights[adapter._trials._prior.generator_variance > 0.1**2].sum(axis=0)
     assert of_greater[0] > 0.99
     assert of_greater[1] < 0.2
 
@@ -264,7 +264,7 @@ def test_one_component_may_be_far_off_where_the_other_is_not():
 def predicted(adapter, conditions):
     """Weights of models, and variances of displacements there, most probably."""
     at = adapter._trials._normalisation.apply(conditions)
-    best, places = adapter._trials._histories[0], adapter._trials._places(at, at)
+    best, places = adapter._trials._histories[0], adapter._trials._inputs(at, at)
     _, variance = best.predict(adapter._trials._prior, places, adapter._trials._memory)
     return best.posterior.model_weights, variance
 
@@ -311,8 +311,8 @@ def test_p_hit_is_the_share_of_sampled_outcomes_within_the_tolerance(k, toleranc
         throw(adapter, goal, 0.05 * np.ones(k))
     condition = adapter.propose(goal) + 0.03
     inside = []
-    for share, history in adapter._trials._weighed():
-        at = adapter._trials._places(adapter._trials._normalisation.apply(condition[None]), goal)
+    for share, history in adapter._trials._weighted_histories():
+        at = adapter._trials._inputs(adapter._trials._normalisation.apply(condition[None]), goal)
         mean, variance = history.predict(adapter._trials._prior, at, adapter._trials._memory)
         weights = history.posterior.model_weights
         moved = np.empty((200_000, k))
@@ -357,13 +357,13 @@ def test_what_a_reading_would_teach_is_what_it_takes_off_the_variance():
     region = np.random.default_rng(0).uniform([0.8, -0.2], [1.0, 0.2], size=(40, 2))
     at = np.array([0.85, -0.12])
     (gain,) = adapter.gain(at[None], region)
-    before = adapter._trials._unknown(
-        adapter._trials._places(*[adapter._trials._normalisation.apply(region)] * 2)
+    before = adapter._trials._mean_variance(
+        adapter._trials._inputs(*[adapter._trials._normalisation.apply(region)] * 2)
     )
     sd = 0.1 * adapter._trials._normalisation.scale
     adapter.observe(at, at, Reading.measured([0.0, 0.0], sd))
-    after = adapter._trials._unknown(
-        adapter._trials._places(*[adapter._trials._normalisation.apply(region)] * 2)
+    after = adapter._trials._mean_variance(
+        adapter._trials._inputs(*[adapter._trials._normalisation.apply(region)] * 2)
     )
     assert gain == pytest.approx(1 - after / before, abs=0.02)
 
@@ -494,7 +494,7 @@ def test_misses_before_a_change_are_judged_by_the_hardware_of_then():
             adapter.propose(GOAL)
         adapter.change_hardware()
         told = adapter._trials._memory
-        assert len(told.bare_misses(told.aims).numbers) == 0
+        assert len(told.bare_misses(told.to_goal).numbers) == 0
         conditions.append(adapter.propose(GOAL))
     np.testing.assert_array_equal(*conditions)
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.adapters.change_points import Change, split
-from prior_reinforce.adapters.memory import Places
+from prior_reinforce.adapters.change_points import Change, branch
+from prior_reinforce.adapters.memory import Inputs
 from prior_reinforce.readings import Reading
 from tests.adapters.test_bayesian import GOAL, after_two_hits
 
@@ -11,23 +11,23 @@ OTHER = np.array([0.85, -0.1])
 
 def test_a_change_concerns_trials_from_it_on_of_all_goals_or_of_one():
     goals = np.array([[0.0, 1.0], [2.0, 3.0], [0.0, 1.0], [2.0, 3.0]])
-    places = Places(goals, np.array([-1, 2, 3, 4]), goals)
-    assert Change(3, 0.8).concerns(places).tolist() == [False, False, True, True]
+    inputs = Inputs(goals, np.array([-1, 2, 3, 4]), goals)
+    assert Change(3, 0.8).affects(inputs).tolist() == [False, False, True, True]
     of_one = Change(2, 0.8, goals[1])
-    assert of_one.concerns(places).tolist() == [False, True, False, True]
+    assert of_one.affects(inputs).tolist() == [False, True, False, True]
 
 
 @pytest.mark.slow
 def test_a_shift_is_the_same_everywhere_and_changed_hardware_is_not():
     adapter = after_two_hits()
     at = np.array([[0.0, 0.0], [2.0, 0.0]])
-    places = Places(at, np.array([2, 2]), at)
-    shift = Change(1, 0.8).covariance(adapter._trials._prior, places, places)
+    inputs = Inputs(at, np.array([2, 2]), at)
+    shift = Change(1, 0.8).covariance(adapter._trials._prior, inputs, inputs)
     np.testing.assert_allclose(shift, 0.64)
-    stretch = Change(1, 0.0).covariance(adapter._trials._prior, places, places)
+    stretch = Change(1, 0.0).covariance(adapter._trials._prior, inputs, inputs)
     np.testing.assert_allclose(np.diag(stretch), 0.09)
     assert stretch[0, 1] == pytest.approx(0.09 * np.exp(-0.5 * (2.0 / 2.5) ** 2))
-    before = Change(3, 0.8).covariance(adapter._trials._prior, places, places)
+    before = Change(3, 0.8).covariance(adapter._trials._prior, inputs, inputs)
     assert not before.any()
 
 
@@ -35,11 +35,11 @@ def happened(adapter, error):
     """What may have happened where a third trial, for the first goal, came down so far off."""
     told = after_two_hits()
     told.observe(GOAL, GOAL, Reading.measured(error, 0.002))
-    may_be = split(
+    may_be = branch(
         adapter._trials._histories,
         adapter._trials._prior,
         adapter._trials._memory,
-        told._trials._memory.only(slice(-1, None)),
+        told._trials._memory.select(slice(-1, None)),
     )
     return [(history.changes, history.mistaken) for history in may_be]
 

@@ -22,7 +22,7 @@ def prior(noise=0.0, correction=(), **settings) -> DisplacementPrior:
 
 def test_models_are_all_combinations_of_what_may_be_wrong():
     settings = {"generator_sd": (0.1, 0.3), "execution_sd": (0.02,), "p_changed": 0.2}
-    share = np.exp(prior(**settings).log_share)
+    share = np.exp(prior(**settings).log_prior)
     assert share.tolist() == pytest.approx([0.48, 0.12, 0.32, 0.08])
 
 
@@ -96,7 +96,7 @@ def test_variances_are_those_of_the_covariance_and_the_noise():
     believed = prior(noise=0.01)
     at = believed.normalisation.apply(np.random.default_rng(0).uniform(0.7, 1.1, size=(9, 2)))
     diagonal = np.diagonal(believed.covariance(at, at), axis1=1, axis2=2)
-    np.testing.assert_allclose(believed.variance(at), diagonal + believed.noise[:, None])
+    np.testing.assert_allclose(believed.variance(at), diagonal + believed.noise_variance[:, None])
 
 
 def test_one_more_demonstration_makes_less_unknown_beside_it():

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import multivariate_normal, norm
 
-from prior_reinforce.adapters.expectation_propagation import Readings, _rest, infer, tilted
+from prior_reinforce.adapters.expectation_propagation import Readings, _cavity, infer, tilted
 
 INF = np.inf
 
@@ -140,7 +140,7 @@ def test_beginning_with_what_was_known_ends_at_the_same_posterior():
     readings = [Readings(low[:, :n], low[:, :n] + 0.1, 0.001 + 0 * low[:, :n]) for n in (6, 9)]
     known = infer(K[:, :6, :6], readings[0])
     again, afresh = (
-        infer(K, readings[1], known=known),
+        infer(K, readings[1], previous=known),
         infer(K, readings[1]),
     )
     sds = np.sqrt(np.diagonal(K, axis1=1, axis2=2))[:, None]
@@ -195,9 +195,9 @@ def test_their_evidence_is_near_the_one_by_enumeration(seed):
 
 def test_where_updates_swing_a_latent_without_its_site_keeps_a_variance():
     mean, variance, tau, nu = np.reshape([0.3, 0.1, 12.0, 5.0], (4, 1, 1, 1))
-    rest_tau, rest_mean = _rest(mean, variance, tau, nu)
-    assert rest_tau > 0
-    assert rest_mean == mean
+    cavity_mean, cavity_tau = _cavity(mean, variance, tau, nu)
+    assert cavity_tau > 0
+    assert cavity_mean == mean
 
 
 def test_without_a_reading_the_rest_say_what_they_say_alone():
@@ -206,7 +206,7 @@ def test_without_a_reading_the_rest_say_what_they_say_alone():
     at, y = rng.uniform(-1, 1, 7), rng.normal(scale=0.3, size=(2, 7))
     K, variance = covariance(at)[None], rng.uniform(0.001, 0.02, size=(2, 7))
     all_of_them, rest = Readings(y, y, variance, outlier=1e-9), np.array([0, 1, 2, 4, 5, 6])
-    some, among = all_of_them.of(np.s_[:, rest]), K[:, rest[:, None], rest]
+    some, among = all_of_them.select(np.s_[:, rest]), K[:, rest[:, None], rest]
     left = infer(K, all_of_them).without(3, among[:, None], some, np.zeros(1))
     alone = infer(among, some)
     np.testing.assert_allclose(left.precision, alone.precision, rtol=1e-6, atol=1e-6)
@@ -223,8 +223,8 @@ def test_an_improbable_model_is_taken_in_all_the_same_and_may_become_the_best():
     variance = np.full((1, 12), 1e-5)
     known, shares = None, []
     for n in range(1, 13):
-        told = Readings(y, y, variance).of(np.s_[:, :n])
-        known = infer(models[:, :n, :n], told, known=known)
+        told = Readings(y, y, variance).select(np.s_[:, :n])
+        known = infer(models[:, :n, :n], told, previous=known)
         shares.append(known.model_weights[:, 0])
     assert shares[5][0] > 0.999
     assert shares[-1][1] > 0.999

@@ -5,8 +5,8 @@ import pytest
 
 from prior_reinforce.adapters.base import State
 from prior_reinforce.adapters.bayesian import BayesianAdapter
-from prior_reinforce.adapters.memory import Memory, Places
-from prior_reinforce.adapters.moved import MovedBelief
+from prior_reinforce.adapters.memory import Inputs, Memory
+from prior_reinforce.adapters.moved import MovedPosterior
 from prior_reinforce.adapters.moved_prior import MovedPrior
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.plans.motions import Demonstrations
@@ -215,7 +215,7 @@ def test_a_table_that_was_bumped_is_hit_again_in_three_throws(size):
     arm.moved = np.array([size, 0.0])
     assert arm.trials(np.array([1.0, 0.05])) <= 3
     assert arm.trials(GOALS[4]) <= 2
-    (change,) = arm.adapter._trials.belief.hypotheses[0].changes
+    (change,) = arm.adapter._trials.posterior.hypotheses[0].changes
     assert change.shift_sd > 0
     assert "moved" in arm.adapter.expect(GOALS[0], GOALS[0], 0.015).remark
 
@@ -424,7 +424,7 @@ def test_no_plan_is_moved_farther_than_it_may_be_to_try_another():
     for _ in range(8):
         condition = arm.adapter.propose(goal)
         assert np.all(
-            np.abs(arm.prior.moved(arm.shown.symmetry.chart.to(condition[None]))) <= farthest + 1e-6
+            np.abs(arm.prior.moves(arm.shown.symmetry.chart.to(condition[None]))) <= farthest + 1e-6
         )
         reading = Reading.measured(arm.lands(condition) - goal, 1.0, hit=False)
         arm.adapter.observe(condition, goal, reading.within(np.array([6.0])))
@@ -471,7 +471,7 @@ def test_a_goal_farther_than_motions_can_be_moved_is_named():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("shown", [SHOWN, FOUR])
-def test_what_was_measured_to_miss_is_not_tried_again_whatever_is_believed(shown):
+def test_what_was_measured_to_miss_is_not_repeats_miss_whatever_is_believed(shown):
     """Everything lands at one place."""
     adapter, tried = Arm(shown=demonstrations(shown)).adapter, np.empty((0, 2))
     for _ in range(6):
@@ -498,16 +498,18 @@ def test_numbers_give_gaussian_regression_in_a_chart_that_is_the_outcomes_own():
     of, rng = given.symmetry, np.random.default_rng(1)
     aims = SHOWN + rng.uniform(-0.3, 0.3, size=(5, 2))
     noise, errors = 0.004, rng.normal(0.0, 0.02, size=(5, 2))
-    belief = MovedBelief(given, p_change=1e-12)
+    posterior = MovedPosterior(given, p_change=1e-12)
     for i, (aim, error) in enumerate(zip(aims, errors, strict=True)):
         one = np.array([i]), aim[None], error[None], error[None]
-        belief.observe(Memory(aim[None], *one, np.full((1, 2), noise**2), np.zeros((1, 2))))
+        posterior.observe(Memory(aim[None], *one, np.full((1, 2), noise**2), np.zeros((1, 2))))
     h = next(
-        i for i, h in enumerate(belief.hypotheses) if belief.model(i).off == 1 and not h.changes
+        i
+        for i, h in enumerate(posterior.hypotheses)
+        if posterior.model(i).offset == 1 and not h.changes
     )
     at = np.array([[1.0, 0.0]])
-    there = belief.outcomes(h, Places(at, np.array([5]), at))
-    spread = belief.spread(h, there)[0]
+    there = posterior.predict(h, Inputs(at, np.array([5]), at))
+    spread = posterior.marginal_covariance(h, there)[0]
     w, w_at = aims - SHOWN, at - SHOWN
     for j in range(2):
 
@@ -530,14 +532,14 @@ def test_p_hit_is_the_share_of_sampled_outcomes_within_the_tolerance():
     arm = Arm()
     arm.throw(GOALS[0], by_eye)
     moved, goal, rng = arm.adapter._trials, GOALS[1], np.random.default_rng(0)
-    condition, belief = arm.adapter.propose(goal), moved.belief
+    condition, posterior = arm.adapter.propose(goal), moved.posterior
     radius, hits, total = np.array([0.02, 0.05]), 0.0, 0.0
-    at = moved._places(condition[None], goal[None])
-    missed = belief.memory.bare_misses(np.zeros((1, 2)))
+    at = moved._inputs(condition[None], goal[None])
+    missed = posterior.memory.bare_misses(np.zeros((1, 2)))
     assert len(missed.goals) == 1  # its words alone may have been a hit
-    for h, share in enumerate(belief.probabilities):
-        both = belief.outcomes(h, missed), belief.outcomes(h, at)
-        blocks = [[belief.covariance(h, a, b)[0, :, 0] for b in both] for a in both]
+    for h, share in enumerate(posterior.probabilities):
+        both = posterior.predict(h, missed), posterior.predict(h, at)
+        blocks = [[posterior.covariance(h, a, b)[0, :, 0] for b in both] for a in both]
         covariance = np.block(blocks) + np.diag(np.tile((radius / 3) ** 2, 2))
         mean = np.concatenate([both[0].mean[0] - missed.goals[0], both[1].mean[0] - goal])
         drawn = rng.multivariate_normal(mean, covariance, size=50_000).reshape(-1, 2, 2)
@@ -570,14 +572,14 @@ def test_what_is_kept_in_a_file_goes_on_as_if_never_put_away(tmp_path):
 
 def test_a_long_day_stays_within_memory():
     arm, rng = Arm(), np.random.default_rng(3)
-    belief = arm.adapter._trials.belief
+    posterior = arm.adapter._trials.posterior
     for i in range(68):
         goal = rng.uniform([0.8, -0.3], [1.2, 0.3])
         arm.adapter.observe(goal, goal, Reading.measured(rng.normal(0.0, 0.004, 2), 0.002))
         if i in (0, 40, 67):
             assert np.all(np.isfinite(arm.adapter.propose(goal)))
-    assert len(belief.memory.numbers) == 64
-    assert len(belief.hypotheses) <= 12
+    assert len(posterior.memory.numbers) == 64
+    assert len(posterior.hypotheses) <= 12
 
 
 def test_a_reading_takes_a_share_of_what_is_unknown_and_most_of_it_near_by():

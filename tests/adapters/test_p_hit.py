@@ -6,14 +6,14 @@ import scipy.special
 from scipy.special import ndtr
 from scipy.stats import norm
 
-from prior_reinforce.adapters.p_hit import Belief, Targets, p_hit_after, share_within
+from prior_reinforce.adapters.p_hit import Prediction, Targets, ball_probability, p_hit_given_misses
 
 OUTLIER = 0.01
 
 
-def belief(mean, variance, at_missed, among_missed, cross) -> Belief:
+def belief(mean, variance, at_missed, among_missed, cross) -> Prediction:
     """Of one history, one model and one component."""
-    return Belief(
+    return Prediction(
         1.0,
         np.ones((1, 1)),
         np.array(at_missed, float)[None, None],
@@ -34,7 +34,7 @@ def targets(aims, radius) -> Targets:
 def test_beside_what_missed_is_what_the_integral_says(aim):
     """One displacement for all conditions, N(0.03, 0.1^2); 0 missed by 0.06 at least."""
     same = belief([0.03], [0.01], [0.03], [[0.01]], [[0.01]])
-    said = p_hit_after([same], targets([0.0], 0.06), targets([aim], 0.06), OUTLIER)
+    said = p_hit_given_misses([same], targets([0.0], 0.06), targets([aim], 0.06), OUTLIER)
     d = np.linspace(-0.7, 0.7, 20001)
     left = norm.pdf(d, 0.03, 0.1) * (0.99 * norm.cdf((abs(d) - 0.06) / 0.006) + OUTLIER)
     hit = norm.cdf((0.06 - abs(d - aim)) / 0.006)
@@ -51,7 +51,7 @@ def test_balls_are_missed_and_hit_as_often_as_in_a_million_throws(k):
     aims = np.array([[0.0] * k, [0.02] + [0.0] * (k - 1), [0.0] * k])
     throws = np.stack([rng.multivariate_normal(m, together, size=1_000_000) for m in mean])
     hit = np.sqrt(np.sum((throws - aims.T[:, None]) ** 2, axis=0)) < 0.07
-    believed = Belief(
+    believed = Prediction(
         1.0,
         np.ones((1, k)),
         mean[None, :, :1],
@@ -60,14 +60,16 @@ def test_balls_are_missed_and_hit_as_often_as_in_a_million_throws(k):
         np.broadcast_to(np.diag(together)[1:], (1, k, 2)),
         np.broadcast_to(together[1:, :1], (1, k, 2, 1)),
     )
-    said = p_hit_after([believed], targets(aims[:1], 0.07), targets(aims[1:], 0.07), outlier=1e-9)
+    said = p_hit_given_misses(
+        [believed], targets(aims[:1], 0.07), targets(aims[1:], 0.07), outlier=1e-9
+    )
     np.testing.assert_allclose(said, hit[~hit[:, 0], 1:].mean(axis=0), atol=0.02)
     assert said[0] < 0.75 * hit[:, 1].mean()
 
 
 def test_a_miss_elsewhere_tells_nothing():
     apart = belief([0.0, 0.0], [0.01, 0.01], [0.0], [[0.01]], [[0.0], [0.0]])
-    said = p_hit_after([apart], targets([0.0], 0.06), targets([0.0, 0.1], 0.06), OUTLIER)
+    said = p_hit_given_misses([apart], targets([0.0], 0.06), targets([0.0, 0.1], 0.06), OUTLIER)
     d = np.linspace(-0.7, 0.7, 20001)
     density = norm.pdf(d, 0.0, 0.1)
     hits = [np.sum(density * norm.cdf((0.06 - abs(d - a)) / 0.006)) for a in (0.0, 0.1)]
@@ -89,20 +91,20 @@ def test_what_told_the_miss_best_is_left(share, are):
             np.full((n, 1, 2), 1e-6),
             np.full((n, 1, 2, 1), 1e-6),
         )
-        return Belief(probability, share, at, tiny[..., None], *two)
+        return Prediction(probability, share, at, tiny[..., None], *two)
 
     if are == "models":
         beliefs = [sure(places, 1.0, shares[:, None])]
     else:
         beliefs = [sure(places[[i]], shares[i], np.ones((1, 1))) for i in range(2)]
-    said = p_hit_after(beliefs, targets([0.0], 0.1), targets([0.0, 0.3], 0.1), OUTLIER)
+    said = p_hit_given_misses(beliefs, targets([0.0], 0.1), targets([0.0, 0.3], 0.1), OUTLIER)
     first = share * OUTLIER / (share * OUTLIER + 1 - share)
     np.testing.assert_allclose(said, [first, 1 - first], atol=0.005)
 
 
 def test_twenty_misses_at_one_condition_are_no_contradiction():
     sure = belief([0.0], [1e-6], np.zeros(20), np.full((20, 20), 1e-6), np.full((1, 20), 1e-6))
-    said = p_hit_after([sure], targets(np.zeros(20), 0.1), targets([0.0], 0.1), OUTLIER)
+    said = p_hit_given_misses([sure], targets(np.zeros(20), 0.1), targets([0.0], 0.1), OUTLIER)
     assert said[0] == pytest.approx(1.0, abs=1e-3)
 
 
@@ -112,7 +114,9 @@ def test_the_share_within_a_ball_is_that_of_samples_whatever_its_size(k, sd):
     rng = np.random.default_rng(k)
     mean = 0.05 * rng.normal(size=k)
     sds = sd * rng.uniform(0.5, 1.5, size=k)
-    share = share_within(mean[None, :, None] / 0.1, sds[None, :, None] / 0.1, np.ones((1, k)))[0]
+    share = ball_probability(mean[None, :, None] / 0.1, sds[None, :, None] / 0.1, np.ones((1, k)))[
+        0
+    ]
     samples = mean + sds * rng.normal(size=(400_000, k))
     assert share == pytest.approx(np.mean(np.linalg.norm(samples, axis=1) < 0.1), abs=0.006)
 
@@ -124,7 +128,7 @@ def test_each_component_is_a_mixture_of_its_own(k):
     mean, sd = 0.1 * rng.normal(size=(3, k)), rng.uniform(0.02, 0.2, size=(3, k))
     share = rng.dirichlet(np.ones(3), size=k).T
     radii = np.array([0.1, 0.2])
-    said = share_within(*(np.stack([of] * 2, 2) / radii for of in (mean, sd)), share)
+    said = ball_probability(*(np.stack([of] * 2, 2) / radii for of in (mean, sd)), share)
     model = np.stack([rng.choice(3, p=share[:, j], size=400_000) for j in range(k)], axis=1)
     samples = rng.normal(mean[model, np.arange(k)], sd[model, np.arange(k)])
     distance = np.linalg.norm(samples, axis=1)
@@ -141,9 +145,9 @@ def test_a_hundred_candidates_share_the_cells_of_one_and_the_best_stays_the_best
     rng = np.random.default_rng(0)
     mean, share = rng.normal(size=(5, k, 100)), rng.dirichlet(np.ones(5), size=k).T
     sd = 0.1 * rng.uniform(0.5, 1.5, size=mean.shape)
-    together = share_within(mean, sd, share)
+    together = ball_probability(mean, sd, share)
     work = sum(asked)
-    alone = [share_within(mean[..., [i]], sd[..., [i]], share)[0] for i in range(100)]
+    alone = [ball_probability(mean[..., [i]], sd[..., [i]], share)[0] for i in range(100)]
     np.testing.assert_allclose(together, alone, atol=off)
     assert together.argmax() == np.argmax(alone)
     assert work < 0.1 * (sum(asked) - work)

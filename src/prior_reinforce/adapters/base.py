@@ -76,7 +76,7 @@ class State:
     key: str = ""
     """`Adapter.key`, which `Adapter.state` adds to what a member says."""
 
-    def made(self, kind: type[_Arrays]) -> _Arrays:
+    def build(self, kind: type[_Arrays]) -> _Arrays:
         """Make an object that is nothing but arrays of its fields' names."""
         return kind(*(self.arrays[field.name] for field in fields(kind)))  # type: ignore[arg-type]
 

@@ -16,117 +16,117 @@ from typing_extensions import Self
 from prior_reinforce.arrays import Point, Points
 from prior_reinforce.readings import NOISE_SDS
 
-AGAIN = 0.5
-"""A condition closer than this share of the tolerance to one that missed the same goal would be
-tried again (ours)."""
-LATEST = 8
-"""The latest trials, which are never forgotten, and whose misses count for themselves (ours)."""
-_KEPT = 64
-"""Trials in memory before one is forgotten for each that comes (ours)."""
+REPEAT_DISTANCE = 0.5
+"""A condition repeats another if it is closer than this share of the tolerance (ours)."""
+RECENT = 8
+"""Number of latest trials, which are never forgotten, and whose misses count separately (ours)."""
+_CAPACITY = 64
+"""Most trials in memory (ours)."""
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
-    """Where and when p displacements are asked for."""
+class Inputs:
+    """Where and when p displacements are predicted: the inputs of the Gaussian process."""
 
     conditions: Points
     numbers: Int[np.ndarray, " p"]
-    """Of the trials, from 0; -1 on the demonstrations' day."""
+    """Of the trials, from 0; -1 on the day of the demonstrations."""
     goals: Points
-    """What they are thrown at."""
+    """Goal of each trial."""
 
-    def only(self, which: Bool[np.ndarray, " n"] | Int[np.ndarray, " m"] | slice) -> Self:
-        """Some of them."""
-        return type(self)(*(of[which] for of in vars(self).values()))
+    def select(self, which: Bool[np.ndarray, " n"] | Int[np.ndarray, " m"] | slice) -> Self:
+        """Index all arrays."""
+        return type(self)(*(array[which] for array in vars(self).values()))
 
 
 @dataclass(frozen=True, eq=False)
-class Memory(Places):
-    """What was read of the displacements of n trials."""
+class Memory(Inputs):
+    """n trials, and the interval in which each displacement was read."""
 
     low: Points
     high: Points
     variance: Points
+    """Of the interval's ends."""
     missed_by: Points
-    """Half-axes of the ellipsoid around its goal that each missed; 0 where nothing is known."""
+    """Half-axes of the ellipsoid around its goal that each trial missed; 0 if none is known."""
 
     @classmethod
     def empty(cls, k: int) -> Memory:
-        """Nothing yet."""
+        """No trial yet."""
         none = np.empty((0, k))
         return cls(none, np.empty(0, int), none, none, none, none, none)
 
     @property
-    def aims(self) -> Points:
+    def to_goal(self) -> Points:
         """Displacements that would have hit: goal minus condition."""
         return self.goals - self.conditions
 
     @property
     def missed(self) -> Bool[np.ndarray, " n"]:
-        """Which trials missed, by how much at least is known."""
+        """Which trials missed a known ellipsoid."""
         return np.any(self.missed_by > 0.0, axis=1)
 
     def bare_misses(self, hits: Points) -> Memory:
-        """The latest trials that missed and of which their readings do not say so.
+        """Return the recent misses whose readings leave a hit possible.
 
         Args:
-            hits: What would have been read of each trial, had it hit, shape (n, k).
+            hits: Reading of each trial if it had hit exactly, shape (n, k).
         """
         which = np.flatnonzero(self.missed)
-        which = which[which >= len(self.numbers) - LATEST]
-        latest, hits = self.only(which), hits[which]
-        beyond = np.maximum(latest.low - hits, hits - latest.high)
-        beyond = np.maximum(beyond - NOISE_SDS * np.sqrt(latest.variance), 0.0)
-        return latest.only(np.linalg.norm(beyond / latest.missed_by, axis=1) < 1.0)
+        which = which[which >= len(self.numbers) - RECENT]
+        recent, hits = self.select(which), hits[which]
+        beyond = np.maximum(recent.low - hits, hits - recent.high)
+        beyond = np.maximum(beyond - NOISE_SDS * np.sqrt(recent.variance), 0.0)
+        return recent.select(np.linalg.norm(beyond / recent.missed_by, axis=1) < 1.0)
 
-    def followed_by(self, others: Memory) -> Memory:
-        """The same and others after them."""
+    def append(self, others: Memory) -> Memory:
+        """Return these trials followed by others."""
         pairs = zip(vars(self).values(), vars(others).values(), strict=True)
         return Memory(*(np.concatenate(pair) for pair in pairs))
 
-    def worth_keeping(self) -> Bool[np.ndarray, " n"]:
-        """All, or all but one where they are too many: the older of the two closest together."""
+    def kept(self) -> Bool[np.ndarray, " n"]:
+        """Which trials to keep: beyond the capacity, not the older of the two closest together."""
         keep = np.ones(len(self.numbers), dtype=bool)
-        if len(keep) > _KEPT:
-            old = self.conditions[:-LATEST]
+        if len(keep) > _CAPACITY:
+            old = self.conditions[:-RECENT]
             square = np.square(old[:, None] - old[None]).sum(axis=-1)
             square[np.tril_indices(len(old))] = np.inf
             keep[np.unravel_index(np.argmin(square), square.shape)[0]] = False
         return keep
 
 
-def untried_around(
+def untried_conditions(
     condition: Point,
     reach: Point | float,
     tried: Float[np.ndarray, "m k"],
     missed_by: Float[np.ndarray, "m k"],
 ) -> Points:
-    """Conditions around one that no trial which missed was next to, as far off as it takes.
+    """Return conditions around one that repeat no miss.
 
     Args:
-        condition: Shape (k,).
-        reach: How far around it is looked first; doubled until something is left.
+        condition: Centre, shape (k,).
+        reach: Half-axes of the first search; doubled until a condition is left.
         tried: Conditions of trials that missed, shape (m, k).
-        missed_by: By how much at least, shape (m, k).
+        missed_by: Half-axes of the ellipsoids that they missed, shape (m, k).
     """
     while True:
-        around = condition + reach * _ball(len(condition))
-        left = around[~tried_again(around, tried, missed_by)]
-        if len(left):
-            return left
+        around = condition + reach * _unit_ball(len(condition))
+        untried = around[~repeats_miss(around, tried, missed_by)]
+        if len(untried):
+            return untried
         reach = 2.0 * reach
 
 
-def tried_again(
+def repeats_miss(
     conditions: Points, tried: Float[np.ndarray, "m k"], missed_by: Float[np.ndarray, "m k"]
 ) -> Bool[np.ndarray, " n"]:
-    """Which conditions are next to one that missed by so much at least."""
+    """Return which conditions repeat one that missed; see `untried_conditions`."""
     apart = (conditions[:, None] - tried) / missed_by
-    return np.asarray(np.any(np.linalg.norm(apart, axis=2) < AGAIN, axis=1))
+    return np.asarray(np.any(np.linalg.norm(apart, axis=2) < REPEAT_DISTANCE, axis=1))
 
 
 @functools.lru_cache
-def _ball(k: int) -> Float[np.ndarray, "q k"]:
+def _unit_ball(k: int) -> Float[np.ndarray, "q k"]:
     """Points that fill the unit ball evenly: additive recurrence by the root of x^(k+1) = x + 1.
 
     Source: Roberts, The unreasonable effectiveness of quasirandom sequences, 2018.

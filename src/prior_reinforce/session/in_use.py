@@ -11,7 +11,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from prior_reinforce.adapters.base import Adapter, Expectation, next_key
-from prior_reinforce.adapters.memory import AGAIN
+from prior_reinforce.adapters.memory import REPEAT_DISTANCE
 from prior_reinforce.arrays import Frames, Point
 from prior_reinforce.errors import (
     ConfigurationError,
@@ -253,7 +253,7 @@ def _missed(state: SessionState, condition: Point) -> int:
             trial.number
             for trial in state.current
             if trial.reading is not None and trial.reading.has_number and not trial.hit
-            if in_tolerances(trial.condition - condition, tolerance) < AGAIN
+            if in_tolerances(trial.condition - condition, tolerance) < REPEAT_DISTANCE
         ),
         0,
     )
