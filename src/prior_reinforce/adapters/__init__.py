@@ -37,7 +37,7 @@ ADAPTERS: Registry[Adapter] = Registry(
 )
 
 DEFAULT_ADAPTER = "bayes"
-"""Of a workspace's goals, and of `adapt`: as good on one goal, and better on the next ones
+"""Default of workspaces and of `adapt`: as good on the first goal, and better on later ones
 (reproduction/docs/decisions-adapter.md)."""
 
 make_adapter = ADAPTERS.make

@@ -26,38 +26,38 @@ from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import Reading
 
 _STATE = 4
-"""Version of what `state` gives, part of the key, so that states kept before are not resumed."""
+"""Version of the data that `state` returns; part of the key, so that no older state is resumed."""
 _Arrays = TypeVar("_Arrays")
 
 
 class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """What is expected of a trial before it is executed; empty where nothing is."""
+    """Prediction of a trial before it is executed; empty if the adapter predicts nothing."""
 
     p_hit: float | None = None
-    """Probability that it reaches the goal."""
+    """Probability that the trial reaches the goal."""
     trials: float | None = None
-    """Trials until the goal is reached, this one included; None if nobody knows."""
+    """Expected trials until the goal is reached, this one included; None if unknown."""
     error: tuple[float, ...] | None = None
     """Expected error, outcome minus goal, k numbers in the outcomes' units, or an array of them;
     None if unknown."""
     sd: tuple[float, ...] | None = None
-    """Its standard deviation, likewise."""
+    """Standard deviation of the error, likewise."""
     remark: str = ""
-    """What a person should know beforehand, in one line, such as that a symmetry does not hold."""
+    """What a person should know before the trial, in one line, such as a symmetry in doubt."""
     nearer: bool = False
-    """Whether the plan is moved less far than readings say, because an object was lost."""
+    """Whether the plan is moved less far than readings suggest, because an object was lost."""
     beyond: bool = False
-    """Whether no plan may be moved so far that it reaches the goal."""
+    """Whether the goal is farther than a plan may be moved."""
 
     @property
     def large_error(self) -> Point:
-        """How large an error may well be, (k,): two standard deviations; 0 if nothing is known."""
+        """Largest plausible error, (k,): |mean| plus two standard deviations; 0 if unknown."""
         if self.error is None or self.sd is None:
             return np.zeros(1)
         return np.asarray(np.abs(self.error) + 2.0 * np.array(self.sd))
 
     def __post_init__(self) -> None:
-        """Keep plain numbers of whatever arrays were given, since journals write them down."""
+        """Convert arrays to plain numbers, which journals can write."""
         for name in ("p_hit", "trials", "error", "sd"):
             if (given := getattr(self, name)) is not None:
                 plain = np.asarray(given, np.float64).tolist()
@@ -67,17 +67,17 @@ class Expectation(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """What an adapter knows, as data that can be kept in a file: no code in it."""
+    """What an adapter has learned, as plain data for a file."""
 
     facts: dict[str, Any]
-    """Of JSON types."""
+    """Values of JSON types."""
     arrays: dict[str, np.ndarray]
-    """Of numbers."""
+    """Arrays of numbers."""
     key: str = ""
-    """`Adapter.key`, which `Adapter.state` adds to what a member says."""
+    """`Adapter.key`; set by `Adapter.state`."""
 
     def build(self, kind: type[_Arrays]) -> _Arrays:
-        """Make an object that is nothing but arrays of its fields' names."""
+        """Make a dataclass whose fields are all arrays of the same names."""
         return kind(*(self.arrays[field.name] for field in fields(kind)))  # type: ignore[arg-type]
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -95,51 +95,49 @@ class State:
         """
         with open_npz(Path(path), "delete it: trials are then told again") as archive:
             arrays = {name: archive[name] for name in archive.files}
-            told = json.loads(str(arrays.pop("facts")))
-            return cls(told["facts"], arrays, told["key"])
+            data = json.loads(str(arrays.pop("facts")))
+            return cls(data["facts"], arrays, data["key"])
 
 
 def next_key(
     key: str,
-    what: str,
+    method: str,
     condition: Point | None = None,
     goal: Point | None = None,
     reading: Reading | None = None,
 ) -> str:
-    """Return `Adapter.key` after one thing more was told.
+    """Return `Adapter.key` after one more call.
 
     Args:
-        key: Before.
-        what: `observe` or `change_hardware`.
-        condition: c, where it is about a trial.
+        key: Key before the call.
+        method: `observe` or `change_hardware`.
+        condition: c of the trial, for `observe`.
         goal: g, likewise.
-        reading: As it was observed.
+        reading: Likewise.
     """
-    digest = hashlib.sha256(f"{key} {what}".encode())
-    told = [condition, goal]
+    digest = hashlib.sha256(f"{key} {method}".encode())
+    arrays = [condition, goal]
     if reading is not None:
-        told += [reading.error_seen, reading.low, reading.high, reading.sd]
-        told += [reading.missed_by_at_least]
+        arrays += [reading.error_seen, reading.low, reading.high, reading.sd]
+        arrays += [reading.missed_by_at_least]
         digest.update(repr((reading.hit, reading.lost)).encode())
-    for values in told:
+    for values in arrays:
         digest.update(b"-" if values is None else np.asarray(values, np.float64).tobytes())
     return digest.hexdigest()
 
 
 class Adapter(ABC):
-    """A condition adapter, correcting what the generator is asked for from trial to trial.
+    """A condition adapter: corrects the condition given to the generator from trial to trial.
 
-    It only ever receives perceived outcomes. It has no notion of a trial's number: to forget an
-    amended or voided trial, the session starts it afresh and observes again (at most a dozen).
+    It receives perceived outcomes only, and knows no trial numbers: after a trial was amended or
+    voided, the session starts it again and repeats the observations (at most a dozen).
 
-    The checks stand here; a member implements `_start`, `_propose` and `_observe`, or
-    `_observe_reading`, which receive fresh, finite vectors of the right length, and only after
-    `start`.
+    This class checks arguments. A member implements `_start`, `_propose`, and `_observe` or
+    `_observe_reading`; they receive fresh, finite vectors of the right length, after `start` only.
     """
 
     carries_over: ClassVar[bool] = False
-    """Whether trials of earlier goals serve it, so that a session gives it those unless told
-    otherwise."""
+    """Whether trials of earlier goals help; a session then passes them by default."""
     _outcome_dim: int | None = None
     _key: str = ""
 
@@ -155,20 +153,20 @@ class Adapter(ABC):
         import prior_reinforce
 
         version = prior_reinforce.__version__, _STATE
-        what = type(self).__qualname__, version, getattr(self, "config", None)
-        return next_key("", f"{what} {demonstrations.sha256}")
+        settings = type(self).__qualname__, version, getattr(self, "config", None)
+        return next_key("", f"{settings} {demonstrations.sha256}")
 
     @property
     def key(self) -> str:
-        """Digest of version, settings, demonstrations, and all that it was told since its start.
+        """Digest of version, settings, demonstrations, and all calls since `start`.
 
-        Adapters with one key propose the same; empty before `start`, and where telling was cut off,
-        so that nobody knows what it knows. `first_key` and `next_key` say what it would be.
+        Adapters of equal key propose the same. Empty before `start`, and after a call that failed:
+        the state is then unknown. `first_key` and `next_key` give a key without the calls.
         """
         return self._key
 
     def state(self) -> State | None:
-        """Return what `resume` needs, so that no trial need be told again; None where few do.
+        """Return what `resume` needs instead of the trials; None if observing again is cheap.
 
         Raises:
             NotFittedError: Before `start`.
@@ -179,11 +177,11 @@ class Adapter(ABC):
         return None if state is None else replace(state, key=self._key)
 
     def resume(self, demonstrations: Demonstrations, state: State) -> None:
-        """Begin with what `state` returned of an adapter with the same settings.
+        """Take up the state of another adapter with the same settings.
 
         Args:
-            demonstrations: Those that it was started with.
-            state: Its `state`.
+            demonstrations: Those that the other was started with.
+            state: The `state` of the other.
         """
         self.start(demonstrations)
         self._key = ""
@@ -206,44 +204,44 @@ class Adapter(ABC):
         return self._propose(self._checked(goal_seen, "goal", InvalidGoalError))
 
     def observe(self, condition: ArrayLike, goal: ArrayLike, reading: Reading | ArrayLike) -> None:
-        """Take in one trial: what was perceived of outcome minus goal for this condition.
+        """Take in one trial: the perceived error of this condition.
 
         Args:
             condition: c. Copied.
-            goal: g, which the reading is about. Copied.
-            reading: What was perceived; an array is a number of unknown origin.
+            goal: g of the trial. Copied.
+            reading: Perceived outcome minus goal; an array is a number of unknown origin.
 
         Raises:
             NotFittedError: Before `start`.
             InvalidFeedbackError: Wrong shape, or not finite.
         """
-        checked = self._checked(condition, "condition", InvalidFeedbackError)
-        about = self._checked(goal, "goal", InvalidFeedbackError)
+        c = self._checked(condition, "condition", InvalidFeedbackError)
+        g = self._checked(goal, "goal", InvalidFeedbackError)
         seen = reading.error_seen if isinstance(reading, Reading) else reading
         error = self._checked(seen, "perceived error", InvalidFeedbackError)
         if not isinstance(reading, Reading):
             reading = Reading.estimated(error)
-        key, self._key = next_key(self._key, "observe", checked, about, reading), ""
-        self._observe_reading(checked, about, reading)
+        key, self._key = next_key(self._key, "observe", c, g, reading), ""
+        self._observe_reading(c, g, reading)
         self._key = key
 
     @property
     def symmetry_doubted(self) -> bool:
-        """Whether trials have left the symmetry that the demonstrations state, if they do."""
+        """Whether trials contradict the symmetry that the demonstrations state, if any."""
         return False
 
     def expect(self, condition: ArrayLike, goal: ArrayLike, tolerance: ArrayLike) -> Expectation:
-        """Return what is expected of a trial; an empty one from adapters that expect nothing.
+        """Predict a trial; the expectation is empty if the adapter predicts nothing.
 
         Args:
-            condition: c, mostly what was proposed.
+            condition: c, usually the proposed one.
             goal: g.
             tolerance: epsilon of each component, or one for all, in the outcomes' units.
 
         Raises:
             NotFittedError: Before `start`.
             InvalidGoalError: Wrong shape, or not finite.
-            ConfigurationError: An adapter of one's own returned something else.
+            ConfigurationError: A user's adapter returned something else.
         """
         expected = self._expect(
             self._checked(condition, "condition", InvalidGoalError),
@@ -256,9 +254,9 @@ class Adapter(ABC):
         return expected
 
     def change_hardware(self) -> None:
-        """Take note that the hardware changes between the trials before and those to come.
+        """Take note that the hardware changes between the last trial and the next.
 
-        Most tell no difference between what was learned and what has changed.
+        Most adapters ignore it.
         """
         key, self._key = next_key(self._key, "change_hardware"), ""
         self._change_hardware()
@@ -270,31 +268,31 @@ class Adapter(ABC):
 
     @abstractmethod
     def _propose(self, goal_seen: Point) -> Point:
-        """See `propose`; the goal may be returned itself."""
+        """See `propose`; may return the goal itself."""
 
     def _observe(self, condition: Point, outcome_seen: Point) -> None:
-        """Take in one trial as a number: the perceived outcome r = g + e; both may be kept."""
+        """Take in one trial: the perceived outcome r = g + e; both arrays may be kept."""
         raise NotImplementedError(
             f"{type(self).__name__} takes in no trials: write _observe, or _observe_reading"
         )
 
     def _observe_reading(self, condition: Point, goal: Point, reading: Reading) -> None:
-        """See `observe`; for adapters that know what to do with more than a number.
+        """See `observe`; for adapters that use more than a number.
 
-        Others get the number, and are not called for a trial without one (a bare "a miss").
+        By default `_observe` gets the number, and trials without one ("a miss") are ignored.
         """
         if reading.has_number:
             self._observe(condition, goal + reading.error_seen)
 
-    def _change_hardware(self) -> None:  # noqa: B027  # most know no difference
+    def _change_hardware(self) -> None:  # noqa: B027  # most ignore it
         """See `change_hardware`."""
 
     def _state(self) -> State | None:
-        """See `state`; for adapters to which it takes long to be told."""
+        """See `state`; for adapters whose observations are expensive."""
         return None
 
     def _resume(self, state: State) -> None:
-        """See `resume`; the adapter was started."""
+        """See `resume`; called after `start`."""
         raise NotImplementedError(f"{type(self).__name__} keeps no state: tell it the trials")
 
     def _expect(self, condition: Point, goal: Point, tolerance: Point) -> Expectation:

@@ -1,7 +1,6 @@
 """A Bayesian condition adapter with interval observations and the full history of trials.
 
-Ours; the paper's adapter is in `gaussian_process`. The model stands in
-`displaced_trials`, and where plans are moved in `moved`.
+Ours; the paper's adapter is in `gaussian_process`.
 """
 
 from __future__ import annotations
@@ -22,17 +21,16 @@ from prior_reinforce.readings import Reading
 
 
 class BayesianAdapter(Adapter):
-    """What is believed of where plans come down, given intervals and words, and the best next try.
+    """Infers outcomes of plans from intervals and words, and proposes the best next condition.
 
-    Demonstrations that carry a symmetry (`plans.symmetry`) are moved, from a single one on; what is
-    believed then stands in `moved_trials` and `moved`. Without one, plans are generated as learned,
-    and what is believed stands in `displaced_trials`.
+    Demonstrations that carry a symmetry (`plans.symmetry`), one or more, are moved: the model is in
+    `moved_trials` and `moved`. Without a symmetry plans are generated as learned: the model is in
+    `displaced_trials`.
 
     64 trials are remembered; then the older of the two closest together is forgotten
-    (`adapters.memory`). Proposals depend on what was observed alone, never on what was proposed
-    before.
+    (`adapters.memory`). Proposals depend on the observations alone, not on earlier proposals.
 
-    Source: ours, because words are intervals, and taken as numbers an adapter stands still.
+    Source: ours, because words are intervals; taken as numbers, they bring an adapter to a halt.
     Constants: fields of our own tasks, of the zoo and of other people's arms; figures in
     reproduction/docs/decisions-adapter.md.
     """
@@ -47,19 +45,19 @@ class BayesianAdapter(Adapter):
 
     @property
     def symmetry_odds(self) -> dict[str, float] | None:
-        """Probabilities that the symmetry holds `as stated`, `the other way`, or that it does not.
+        """Probabilities that the symmetry holds `as stated`, `the other way`, or not (`none`).
 
-        The last is `none`. None where the demonstrations state no symmetry.
+        None if the demonstrations state no symmetry.
         """
         return self._trials.odds
 
     @property
     def symmetry_doubted(self) -> bool:
-        """Whether evidence has left the symmetry that the demonstrations state.
+        """Whether evidence contradicts the symmetry that the demonstrations state.
 
-        So where it more probably works the other way or not at all, where everything seems shifted
-        before a first goal was reached, and where objects are lost again and again. Another axis is
-        then worth a try: to start again with it costs a trial or two less than to go on.
+        It does if the symmetry more probably works the other way or not at all, if all outcomes
+        seem shifted before a first goal was reached, or if objects are lost again and again. Then
+        starting again with another axis costs a trial or two less than continuing.
         """
         return self._trials.doubted
 
@@ -99,12 +97,12 @@ class BayesianAdapter(Adapter):
         return self._trials.p_hit(conditions, goals, radius)
 
     def displacement(self, conditions: Points, *, hardware: bool = True) -> Points:
-        """Return where outcomes are expected to lie, seen from these conditions.
+        """Return the expected displacement of outcomes from these conditions.
 
         Args:
             conditions: Shape (n, k), in the outcomes' units.
-            hardware: With what differs from the demonstrations' day; otherwise what labels and
-                generator get wrong alone.
+            hardware: Include changes since the day of the demonstrations; otherwise only errors of
+                labels and generator.
 
         Returns:
             Outcome minus condition, shape (n, k), in the outcomes' units.
@@ -114,17 +112,16 @@ class BayesianAdapter(Adapter):
     def gain(
         self, candidates: Points, over: Float[np.ndarray, "m k"], *, demonstrations: bool = False
     ) -> Float[np.ndarray, " n"]:
-        """Return by how much a reading at each candidate would lower what is unknown elsewhere.
+        """Return by what share a reading at each candidate would lower the variance elsewhere.
 
         Args:
-            candidates: Conditions that a trial might be made with, shape (n, k), in the outcomes'
-                units.
-            over: Conditions whose displacements are to be known, shape (m, k).
-            demonstrations: Demonstrations with these outcomes would be added instead of trials; the
-                generator then mixes anew, which can also make less known.
+            candidates: Conditions of possible trials, shape (n, k), in the outcomes' units.
+            over: Conditions whose displacements are of interest, shape (m, k).
+            demonstrations: Add demonstrations with these outcomes instead of trials; the generator
+                then mixes differently, which can also raise the variance.
 
         Returns:
-            Share of the mean variance over those places that is gone afterwards; of a trial exact
-            for a number read to 0.1 spreads, which is about a word by eye.
+            Share of the mean variance over those conditions that is removed; of a trial exact for a
+            number read to 0.1 spreads, about as fine as a word by eye.
         """
         return self._trials.gain(candidates, over, demonstrations=demonstrations)

@@ -8,7 +8,7 @@ from prior_reinforce.plans.motions import Demonstrations
 
 
 class FrozenAdapter(Adapter):
-    """The condition is the goal, whatever was seen."""
+    """The condition is always the goal."""
 
     def _start(self, demonstrations: Demonstrations) -> None:
         pass

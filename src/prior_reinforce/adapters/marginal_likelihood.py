@@ -1,8 +1,8 @@
-"""How well a constant x RBF kernel explains some points, and the kernel that does so best.
+"""The constant x RBF kernel of greatest marginal likelihood.
 
 The kernel is a exp(-d^2 / (2 l^2)), with alpha_i added to the diagonal: scikit-learn's
-`ConstantKernel(a) * RBF(l)` and `alpha`, whose meaning of these words is kept throughout. Several
-outputs share one kernel, and their log likelihoods are summed, as there.
+`ConstantKernel(a) * RBF(l)` and `alpha`. Several outputs share one kernel, and their log
+likelihoods are summed, as in scikit-learn.
 
 The global maximum needs no restarts. With A = diag(alpha) and the eigendecomposition
 A^(-1/2) R(l) A^(-1/2) = U diag(s) U' of one length scale's correlation matrix, the likelihood of
@@ -10,9 +10,9 @@ every amplitude is a sum over n eigenvalues,
 
     log p(l, a) = -1/2 sum_i [ q_i / (a s_i + 1) + k log(a s_i + 1) + k log(2 pi alpha_i) ],
 
-where q_i is the squared length of row i of U' A^(-1/2) Y. So a scan over length scales, all
-decomposed in one batch, with the amplitude solved for each, sees every basin, and zooming into the
-best of them gives the maximum.
+where q_i is the squared length of row i of U' A^(-1/2) Y. A scan over length scales, decomposed in
+one batch, with the best amplitude of each, finds every basin; zooming into the best of them gives
+the maximum.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from scipy.spatial.distance import cdist
 from prior_reinforce.arrays import Points
 
 _SCAN_POINTS = 64
-"""Length scales of the scan, evenly spaced in log l: a step is about 0.25 for data that occur."""
+"""Length scales of the scan, evenly spaced in log l: a step is about 0.25 for typical data."""
 _AMPLITUDE_POINTS = 32
 """Amplitudes tried for each length scale, before Newton's method finds the best."""
 _NEWTON_STEPS = 5
 """From within 0.4 of the maximum in log a, four steps reach 1e-10."""
 _BASINS = 3
-"""Local maxima of the scan that are zoomed into, at most."""
+"""Most local maxima of the scan that are refined."""
 _BASIN_MARGIN = 1.0
-"""Log likelihood by which a peak of the scan may lie below the highest and still be tried: within
-half a step of a peak the likelihood of a dozen points falls by less than 0.5."""
+"""Log likelihood by which a refined peak of the scan may lie below the highest: within half a step
+of a peak the likelihood of a dozen points falls by less than 0.5."""
 _ZOOM_POINTS = 17
 _ZOOM_ROUNDS = 4
 """Each round divides the bracket by (points - 1) / 2 = 8: 4 rounds end at 1e-4 of a scan step."""
@@ -124,7 +124,7 @@ def maximise(
 
 
 class _Spectra:
-    """Correlation matrices of several length scales, decomposed so that amplitudes are cheap."""
+    """Eigendecompositions of the correlation matrices of several length scales."""
 
     def __init__(
         self,
@@ -162,8 +162,9 @@ class _Spectra:
             u = np.exp(log_a) * s
             d = u + 1.0
             slope = np.sum(u * (q - outputs * d) / d**2, axis=1, keepdims=True)
-            bend = np.sum(u * (q * (1.0 - u) - outputs * d) / d**3, axis=1, keepdims=True)
-            move = np.where(bend < 0.0, -slope / np.minimum(bend, -1e-300), step * np.sign(slope))
+            curvature = np.sum(u * (q * (1.0 - u) - outputs * d) / d**3, axis=1, keepdims=True)
+            newton = -slope / np.minimum(curvature, -1e-300)
+            move = np.where(curvature < 0.0, newton, step * np.sign(slope))
             log_a = np.clip(log_a + np.clip(move, -step, step), low, high)
         candidates = np.concatenate([start, log_a], axis=1)
         values = self.log_likelihood(candidates)
@@ -181,7 +182,7 @@ def _correlation(
 def _distinct_log_lengths(
     squared_distances: Float[np.ndarray, "n n"], bounds: tuple[float, float]
 ) -> tuple[float, float]:
-    """Return the bounds in log l, leaving out short ones that all give the same matrix.
+    """Return the bounds in log l, without short length scales that all give the same matrix.
 
     At an eighth of the least distance the correlation matrix is the identity to 1e-14.
     """

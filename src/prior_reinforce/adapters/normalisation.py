@@ -1,4 +1,4 @@
-"""Outcomes around 0, spread about 1: the units in which adapters work."""
+"""Normalised units of adapters: outcomes of mean 0 and standard deviation about 1."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from prior_reinforce.plans.motions import Demonstrations
 
 @dataclass(frozen=True, eq=False)
 class Normalisation:
-    """An affine map fixed by the demonstrations, so that trials cannot move it."""
+    """An affine map, fixed by the demonstrations and independent of trials."""
 
     offset: Point
     """Mean of the demonstrated outcomes, in the outcomes' units."""
     scale: Point
-    """What counts as 1, in the outcomes' units."""
+    """Unit, in the outcomes' units."""
 
     @classmethod
     def of(cls, demonstrations: Demonstrations) -> Normalisation:
-        """Return the demonstrations' own: their mean, and their standard deviation.
+        """Return the map that takes off the demonstrations' mean and divides by their deviation.
 
         Components of one unit share one scale (the root mean square of their deviations), so that
-        the kernel stays isotropic on a table: 5 cm to the side are as far as 5 cm ahead. Metres
-        beside seconds have a scale each, without which a sum of squares would mean nothing.
+        the kernel stays isotropic on a table: 5 cm to the side are as far as 5 cm ahead. Metres and
+        seconds have separate scales, without which a sum of squares would mean nothing.
         """
         outcomes, variance = demonstrations.outcomes_seen, demonstrations.spread**2
         units = np.array(demonstrations.outcome_format.units)
@@ -34,9 +34,9 @@ class Normalisation:
         return cls(offset=outcomes.mean(axis=0), scale=scale)
 
     def apply(self, values: Float[np.ndarray, "*n k"]) -> Float[np.ndarray, "*n k"]:
-        """Return outcomes or conditions in normalised units."""
+        """Convert outcomes or conditions to normalised units."""
         return (values - self.offset) / self.scale
 
     def undo(self, values: Float[np.ndarray, "*n k"]) -> Float[np.ndarray, "*n k"]:
-        """Return normalised values in the outcomes' units."""
+        """Convert normalised values to the outcomes' units."""
         return values * self.scale + self.offset

@@ -13,9 +13,9 @@ from prior_reinforce.plans.motions import Demonstrations
 class ProportionalAdapter(Adapter):
     """Next condition = last condition - gain x last observed error (paper, Section V-B).
 
-    The first condition is the goal. Asked about another goal than the last trial's, the error is
-    that trial's outcome minus the new goal: one trial then makes `gain` of the way, so that a
-    session for a new goal is better started afresh.
+    The first condition is the goal. For another goal than the last trial's, the error is that
+    trial's outcome minus the new goal: a trial then goes `gain` of the way, so that it is better to
+    start again for a new goal.
     """
 
     def __init__(self, gain: float = 0.8) -> None:
