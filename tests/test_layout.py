@@ -19,7 +19,7 @@ TESTED_ELSEWHERE = {
     "arm/workspace/folder": "what is one and what is not is in arm/workspace/test_workspace",
     "arm/workspace/reaching": "goals out of reach are in arm/workspace/test_declared",
     "arm/workspace/template": "what it writes is read in arm/workspace/test_manifest",
-    "session/in_use": "what a session loads is in session/test_session",
+    "session/parts": "what a session loads is in session/test_session",
     "perception/base": "an interface, held to in testing/test_perception",
 }
 """Modules without a test file of their own, and where they are tested instead."""

@@ -1,4 +1,4 @@
-"""What perception reports of one trial: the error, and its uncertainty.
+"""Reading of one trial: the perceived error, and its uncertainty.
 
     e = r - g, the true error  lies in [low, high] +- sd, in each component
     e tilde  `error_seen`      one number for each component (the paper's)
@@ -30,24 +30,23 @@ EYE_NEAR = np.array([0.0, 0.02, 0.05, 0.10])
 """Distances an observer distinguishes near the goal, in [m] (paper: 0 cm, 2 cm, 5 cm, multiples of
 10 cm)."""
 EYE_BETWEEN = (0.01, 0.035, 0.075)
-"""Half-way between them; as literals, since the float (5 cm + 10 cm) / 2 is not 7.5 cm."""
+"""Midpoints of these; literals, since the float (5 cm + 10 cm) / 2 is not 7.5 cm."""
 EYE_STEP = 0.10
-"""Distances beyond are multiples of this, in [m]."""
+"""Farther distances are multiples of this, in [m]."""
 LEAST_SD = 0.01
 """Least sd of a length of unknown origin, in [m] (ours): half of an observer's finest step."""
 _SHARE_SD = 0.2
 """Relative sd of a number of unknown origin (ours): people misjudge lengths by 15 to 25 %, and the
 paper's amplified noise is 20 %."""
 OPEN_ERROR = 0.05
-"""Number used for a length of which only the direction is known, in [m] (ours): an observer's
-middle word."""
+"""Length used if only the direction is known, in [m] (ours): an observer's middle word."""
 _SAME = 1e-9
-"""Numbers are compared to the nanometre."""
+"""Tolerance of comparisons, in [m]."""
 _MEASURED = 0.5
 """A number with an sd below this share of the tolerance is more informative than a hit (ours)."""
 NOISE_SDS = 2.0
-"""Standard deviations of a reading within which it leaves a hit possible (ours): only then a miss
-says more than its reading, where words are coarse, or numbers noisy."""
+"""Standard deviations within which a reading leaves a hit possible (ours): only then a miss says
+more than its reading, as with coarse words or noisy numbers."""
 
 
 class ReadingRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -82,11 +81,11 @@ class Reading:
     hit: bool | None = None
     """Whether the goal was reached; None if that was not seen directly."""
     said: str = ""
-    """The words, if it was given in words, with the units that were understood."""
+    """The words, if given in words, with the units that were understood."""
     lost: bool = False
-    """Whether the object went where nobody could see it, or never left: a miss."""
+    """Whether the object was lost from sight, or never left: a miss."""
     missed_by_at_least: Point | None = None
-    """Half-axes of an ellipsoid that the true error lies outside of, after a miss; None if unknown.
+    """After a miss, half-axes of an ellipsoid that the true error lies outside of; None if unknown.
     Set by `within`."""
 
     @property
@@ -132,7 +131,7 @@ class Reading:
 
     @classmethod
     def measured(cls, error: ArrayLike, sd: ArrayLike = 0.0, hit: bool | None = None) -> Self:
-        """A measured number, with the standard deviation of the measurement.
+        """Make a reading of a measured number, with the standard deviation of the measurement.
 
         Args:
             error: Outcome minus goal, shape (k,), in the outcomes' units.
@@ -146,7 +145,7 @@ class Reading:
     def estimated(
         cls, error: ArrayLike, least_sd: ArrayLike = LEAST_SD, hit: bool | None = None
     ) -> Self:
-        """A number of unknown origin: sd^2 = (a fifth of it)^2 + least_sd^2 (ours, see above).
+        """Make one of a number of unknown origin: sd^2 = (a fifth of it)^2 + least_sd^2 (ours).
 
         Args:
             error: Outcome minus goal, shape (k,), in the outcomes' units.
@@ -158,7 +157,7 @@ class Reading:
 
     @classmethod
     def by_eye(cls, words: ArrayLike, hit: bool | None = None) -> Self:
-        """An observer's words as intervals with sharp ends (see `perception.eye`).
+        """Make one of an observer's words: intervals with sharp ends (see `perception.eye`).
 
         0 cm is anything within 1 cm, 2 cm from 1 to 3.5, 5 cm from 3.5 to 7.5, 10 cm from 7.5 to
         15, 20 cm from 15 to 25, ... If 2 cm is the only component that is not zero, it may be a
@@ -179,30 +178,30 @@ class Reading:
             low[np.argmax(size)] = EYE_BETWEEN[0] / math.sqrt(size.size)
         left = said < 0
         low, high = np.where(left, -high, low), np.where(left, -low, high)
-        unsaid = cls.estimated(said)
+        estimated = cls.estimated(said)
         by_word = near | (np.abs(size - tens) < _SAME)
         return cls(
             said,
             np.where(by_word, low, said),
             np.where(by_word, high, said),
-            np.where(by_word, 0.0, unsaid.sd),
+            np.where(by_word, 0.0, estimated.sd),
             hit,
         )
 
     @classmethod
     def only(cls, hit: bool, outcome_dim: int, *, lost: bool = False) -> Self:
-        """Only that it hit, missed, or was lost; `error_seen` is 0."""
+        """Make one that says only hit, miss or lost; `error_seen` is 0."""
         everywhere, zero = np.full(outcome_dim, np.inf), np.zeros(outcome_dim)
         return cls(zero, -everywhere, everywhere, zero, hit, lost=lost)
 
     @property
     def has_place(self) -> bool:
-        """Whether it says where the object ended: some bound of the error is known."""
+        """Whether some bound of the error is known."""
         return bool(np.any(np.isfinite(self.low) | np.isfinite(self.high)))
 
     @property
     def is_open(self) -> bool:
-        """Whether some component has an open end: only its direction was seen, or not even that."""
+        """Whether some component has an open end: its size is unknown."""
         return not bool(np.isfinite([*self.low, *self.high]).all())
 
     @property
@@ -217,12 +216,11 @@ class Reading:
     def within(self, radius: Point) -> Self:
         """Condition the intervals on hit or miss.
 
-        A number that is farther off than its noise explains is a miss, whether or not that was
-        told. After a hit every component lies within the radius; if that contradicts the intervals,
-        the hit is believed. After a miss, a component must make up for what the others cannot: "2
-        cm long" that missed by more than 1.5 cm, and at most 1 cm to the side, was at least 1.1 cm
-        long. Components stay independent: intervals describe a box, and the ellipsoid itself is
-        kept in `missed_by_at_least`.
+        An error that is larger than its noise explains is a miss, told or not. After a hit every
+        component lies within the radius, even if that contradicts the intervals. After a miss, each
+        component is at least as large as the others' bounds require: "2 cm long" that missed by
+        more than 1.5 cm, and at most 1 cm to the side, was at least 1.1 cm long. Components stay
+        independent: intervals describe a box, and `missed_by_at_least` keeps the ellipsoid.
 
         Args:
             radius: Tolerance of each component, shape (k,), in the outcomes' units.
@@ -232,9 +230,9 @@ class Reading:
         if self.hit:
             measured = (self.low == self.high) & (self.sd < _MEASURED * radius)
             low, high = np.clip(self.low, -radius, radius), np.clip(self.high, -radius, radius)
-            apart = ~measured & ((high - low < 0.1 * radius) | (self.low == self.high))
-            low, high = np.where(apart, -radius, low), np.where(apart, radius, high)
-            return replace(self, low=low, high=high, sd=np.where(apart, 0.0, self.sd))
+            contradicts = ~measured & ((high - low < 0.1 * radius) | (self.low == self.high))
+            low, high = np.where(contradicts, -radius, low), np.where(contradicts, radius, high)
+            return replace(self, low=low, high=high, sd=np.where(contradicts, 0.0, self.sd))
         farthest = np.square(np.maximum(np.abs(self.low), np.abs(self.high)) / radius)
         others = np.array([np.delete(farthest, j).sum() for j in range(radius.size)])
         least = radius * np.sqrt(np.maximum(1.0 - others, 0.0))
@@ -249,12 +247,12 @@ class Reading:
         )
 
     def _is_sure_miss(self, radius: Point) -> bool:
-        """Whether the intervals, with their noise, are all outside of the tolerance."""
+        """Whether the intervals, widened by noise, lie outside of the tolerance."""
         beyond = np.maximum(np.maximum(self.low, -self.high) - NOISE_SDS * self.sd, 0.0)
         return float(np.linalg.norm(beyond / radius)) > 1.0
 
     def record(self) -> ReadingRecord:
-        """Plain data for a log."""
+        """Return plain data for a log."""
         hit = None if self.hit is None else bool(self.hit)
         low, high = _ends(self.low), _ends(self.high)
         return ReadingRecord(
@@ -263,7 +261,7 @@ class Reading:
 
     @classmethod
     def from_record(cls, record: ReadingRecord) -> Self:
-        """Read what `record` returned."""
+        """Restore a reading from `record`."""
         low = np.array([-math.inf if end is None else end for end in record.low])
         high = np.array([math.inf if end is None else end for end in record.high])
         seen, sd = np.array(record.error_seen), np.array(record.sd)

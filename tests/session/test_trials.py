@@ -8,7 +8,7 @@ from prior_reinforce.errors import WorkspaceError
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.events import Amended, Asked, GoalSet, Told, Voided
-from prior_reinforce.session.trials import Log, Stage, told_of, trials_to_hit
+from prior_reinforce.session.trials import Log, Stage, told_trials, trials_to_hit
 
 
 def reading(*error_seen):
@@ -164,7 +164,7 @@ def test_trials_until_the_first_hit_are_those_that_count():
     again = replace(ASKED, trial=2), Told(trial=2, reading=reading(0.0, 0.0), hit=True)
     third = replace(ASKED, trial=3)
     trials = state(GOAL, ASKED, VOIDED, *again, third).trials
-    assert [trial.number for trial in told_of(trials)] == [2]
+    assert [trial.number for trial in told_trials(trials)] == [2]
     assert trials_to_hit(trials) == 1
     assert trials_to_hit(state(GOAL, ASKED, TOLD, *again).trials) == 2
     assert trials_to_hit(state(GOAL, ASKED, TOLD).trials) is None

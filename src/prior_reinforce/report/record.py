@@ -21,7 +21,7 @@ from prior_reinforce.arrays import Point, as_goal
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.formats import OutcomeFormat, in_tolerances
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.session.trials import Stage, Trial, told_of, trials_to_hit
+from prior_reinforce.session.trials import Stage, Trial, told_trials, trials_to_hit
 
 Box = Float[np.ndarray, "2 k"]
 """Lower and upper corner of a region of outcomes."""
@@ -115,8 +115,8 @@ class AdaptationRecord:
 
     @property
     def told(self) -> tuple[Trial, ...]:
-        """The trials that count, as in `told_of`."""
-        return told_of(self.trials)
+        """The trials that count, as in `told_trials`."""
+        return told_trials(self.trials)
 
     @property
     def trials_to_hit(self) -> int | None:

@@ -1,1 +1,1 @@
-"""Algorithm 1, trial by trial: what is asked, what is told, and what is known of both."""
+"""Algorithm 1, trial by trial: sessions, their events, and the state these add up to."""

@@ -1,6 +1,6 @@
-"""What can happen to the trials of a session, as typed events.
+"""Typed events of a session: everything that can happen to its goals and trials.
 
-A log is a list of events that only grows; what stands is a fold over it
+A log is a list of events that only grows; the current state is a fold over it
 (`trials.SessionState`). In a journal on disk an event is a JSON object whose `kind` is the name of
 its class, in snake case.
 """
@@ -45,7 +45,7 @@ class GoalSet(Event, frozen=True):
 
 
 class Asked(Event, frozen=True):
-    """A plan was given out."""
+    """A plan was returned to be executed."""
 
     trial: int
     goal: int
@@ -61,20 +61,20 @@ class Asked(Event, frozen=True):
 
 
 class Told(Event, frozen=True):
-    """What was seen of a trial was told."""
+    """The reading of a trial was told."""
 
     trial: int
     reading: ReadingRecord
     hit: bool
-    """Whether the goal was reached: as seen, or judged by the perceived error."""
+    """Whether the goal was reached: seen directly, or judged by the perceived error."""
 
 
 class Amended(Told, frozen=True):
-    """What was told of a trial was corrected."""
+    """The reading of a trial was corrected."""
 
 
 class Voided(Event, frozen=True):
-    """A trial was declared no data."""
+    """A trial was declared not to be data."""
 
     trial: int
     reason: str

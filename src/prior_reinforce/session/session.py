@@ -1,9 +1,8 @@
-"""Algorithm 1 of the paper as the one state machine of trials: the one place where pi and M meet.
+"""Algorithm 1 of the paper as a state machine of trials: the one place where pi and M meet.
 
-A trial is asked for, executed by anything at all (an arm, a simulator, a person), and told. Between
-`ask` and `tell` a session can wait for an afternoon. Every rule of a trial stands here; what
-happened stands in a log, a list in memory or a workspace's journal, from which a session is brought
-back.
+A trial is asked for, executed by anything (an arm, a simulator, a person), and told. Between `ask`
+and `tell` a session can wait for an afternoon. The rules of a trial are here; the events are in a
+log, a list in memory or the journal of a workspace, from which a session is restored.
 
 Notation (docs/notation.md):
     g tilde  `goal`        (k,)    [m], table frame
@@ -31,7 +30,7 @@ from prior_reinforce.parsing import as_place, as_reading
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.readings import Reading
 from prior_reinforce.session.events import Amended, GoalSet, Told, Voided
-from prior_reinforce.session.in_use import InUse, check_parts, generated, latest_goal
+from prior_reinforce.session.parts import Parts, check_parts, generate_plans, latest_goal
 from prior_reinforce.session.trials import Goal, Log, SessionState, Stage, Trial, Verdict
 
 
@@ -54,7 +53,7 @@ class Session:
         gate: Callable[[Frames, Point], Verdict | None] | None = None,
         check_open: Callable[[Trial, Literal["ask", "tell"]], None] | None = None,
     ) -> None:
-        """Begin, or go on where a log ends.
+        """Begin, or continue where a log ends.
 
         The first three may be functions that load them, called when first needed, and again when
         the log names another model (`SessionState.in_use`): telling, voiding and amending need
@@ -71,11 +70,11 @@ class Session:
                 whose length, each component divided by its tolerance, is at most 1.
             carry_over: Let the adapter learn from the trials of earlier goals too; by default it
                 does where they serve it (`Adapter.carries_over`).
-            log: What happened so far, and where to write what happens; in memory if not given.
-            gate: Holds a plan and the condition that it is for against a robot's limits whenever it
-                is to leave, such as `check_plan`; by default nothing is checked.
-            check_open: Raises TrialStateError where the open trial may not be given out again, or
-                not be told; by default it always may.
+            log: Earlier events, and where to write new ones; in memory if not given.
+            gate: Checks a plan, given its condition, against a robot's limits whenever the plan is
+                returned, such as `check_plan`; by default nothing is checked.
+            check_open: Raises TrialStateError if the open trial may not be returned again, or not
+                be told; by default it always may.
 
         Raises:
             InvalidGoalError: The goal has a wrong shape, or is not finite.
@@ -87,7 +86,7 @@ class Session:
         self.log = Log() if log is None else log
         self._given: Any = (generator, adapter, demonstrations)
         self._gate, self._check_open = gate, check_open
-        self._in_use = InUse(self._given, ())
+        self._current = Parts(self._given, ())
         self._carry_over = carry_over
         self._tolerance = tolerance
         self._lock = RLock()
@@ -111,7 +110,7 @@ class Session:
 
     @property
     def state(self) -> SessionState:
-        """What happened so far, whoever wrote it down."""
+        """The state that all events of the log add up to."""
         return self.log.state()
 
     @property
@@ -222,7 +221,7 @@ class Session:
             The trial, with its plan and the gate's verdict on it.
 
         Raises:
-            OutOfReachError: Plans go no farther, and the last that does missed.
+            OutOfReachError: No plan reaches the goal, and the nearest one missed.
             RobotLimitError: The plan breaks a limit of the robot.
             TrialStateError: The open trial may not be given out again (`check_open`).
             WorkspaceError: No goal is set, or the log cannot be written.
@@ -306,33 +305,33 @@ class Session:
         state = self.state
         if state.goal is None:
             return "Session(no goal)"
-        said = "reached" if state.solved else "not reached"
+        reached = "reached" if state.solved else "not reached"
         waits = f"; trial {state.open_trial.number} waits" if state.open_trial else ""
         goal = np.round(state.goal.goal, 4).tolist()
         told = f"{self.n_trials} trial{'s' * (self.n_trials != 1)} told"
-        return f"Session(goal {goal} {said}, {told}{waits})"
+        return f"Session(goal {goal} {reached}, {told}{waits})"
 
     def __getstate__(self) -> dict[str, Any]:
-        """Everything but the lock: a session in memory is copied with its log."""
+        """Return all but the lock: a copy of a session in memory has its own log."""
         return {name: value for name, value in self.__dict__.items() if name != "_lock"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """As it was, with a lock of its own."""
+        """Restore with a new lock."""
         self.__dict__.update(state, _lock=RLock())
 
     @contextmanager
     def _exclusive(self) -> Iterator[SessionState]:
-        """Hold the log, and know all that it says."""
+        """Hold the log, and return its state."""
         with self._lock, self.log.exclusive():
             yield self.log.state()
 
-    def _parts(self, state: SessionState) -> InUse:
-        """What is in use as the log says; what was loaded before is forgotten where it is not."""
+    def _parts(self, state: SessionState) -> Parts:
+        """Return the parts that the log names; parts of other names are dropped."""
         with self._lock:
             names = (*state.in_use, "" if state.goal is None else state.goal.adapter)
-            if names != self._in_use.names:
-                self._in_use = InUse(self._given, names)
-            return self._in_use
+            if names != self._current.names:
+                self._current = Parts(self._given, names)
+            return self._current
 
     def _append_reading(
         self,
@@ -342,16 +341,16 @@ class Session:
         seen: Reading | ArrayLike | None,
         hit: bool | None,
     ) -> None:
-        bare = not isinstance(seen, Reading | str | None)  # else nothing has to be loaded
-        shown = self.demonstrations.outcomes_seen if bare else 0.0
+        number = not isinstance(seen, Reading | str | None)  # others need no demonstrations
+        shown = self.demonstrations.outcomes_seen if number else 0.0
         reading = as_reading(seen, hit, goal.goal, goal.format, trial.expected.large_error, shown)
-        # Where a component is open, nobody knows.
+        # An error with an open end is judged a miss.
         near = goal.is_hit(reading.error_seen) and np.isfinite(reading.spread).all()
         reached = near if reading.hit is None else reading.hit
         self.log.append(event(trial=trial.number, reading=reading.record(), hit=bool(reached)))
 
     def informed_adapter(self) -> Adapter:
-        """The adapter, after it has seen every reading that counts for the goal of now.
+        """Return the adapter after every reading that counts for the latest goal.
 
         For queries only; changes made to it are not rolled back.
 
@@ -359,19 +358,19 @@ class Session:
             WorkspaceError: No goal is set.
         """
         with self._exclusive() as state:
-            return self._parts(state).believed(state, self.log).adapter
+            return self._parts(state).trusted(state, self.log).adapter
 
     def _check(self, trial: Trial, verb: Literal["ask", "tell"]) -> None:
-        """Raise TrialStateError where an open trial may not be given out again, or not be told."""
+        """Raise TrialStateError if an open trial may not be returned again, or not be told."""
         if self._check_open is not None:
             self._check_open(trial, verb)
 
-    def _open(
-        self, state: SessionState, parts: InUse, condition: Point, plan: Frames, may_repeat: bool
+    def _open_trial(
+        self, state: SessionState, parts: Parts, condition: Point, plan: Frames, may_repeat: bool
     ) -> Verdict | None:
-        """Write a new trial down, if its plan may be executed."""
+        """Append a new trial to the log, if its plan may be executed; return the gate's verdict."""
         again = may_repeat and self._gate is None
-        event, plan, verdict = parts.passing(
+        event, plan, verdict = parts.next_trial(
             state, condition, plan, self._verdict, may_repeat=again
         )
         self.log.keep_adapter(parts.adapter)
@@ -381,9 +380,9 @@ class Session:
     def _with_plan(
         self, state: SessionState, number: int, fresh: Mapping[Session, Verdict | None]
     ) -> Trial:
-        """A trial with its plan and the gate's verdict, unless the gate refuses it now.
+        """Return a trial with its plan and the gate's verdict, unless the gate refuses it now.
 
-        `fresh` has the verdicts on trials that were opened just now.
+        `fresh` holds the verdicts on trials that this call has opened.
         """
         trial = state.trial(number)
         if not trial.open:
@@ -396,7 +395,7 @@ class Session:
         return replace(trial, plan=plan, verdict=verdict)
 
     def _verdict(self, plan: Frames, condition: Point, refusal: str) -> Verdict | None:
-        """What the gate says of a plan; an error that begins with `refusal` if it refuses."""
+        """Return the gate's verdict; if it refuses, raise an error that begins with `refusal`."""
         try:
             verdict = None if self._gate is None else self._gate(plan, condition)
             if verdict is not None:
@@ -411,21 +410,21 @@ def ask_all(sessions: Sequence[Session], *, may_repeat: bool = True) -> list[Tri
 
     Args:
         sessions: Different sessions; those that share a generator share its call.
-        may_repeat: Without a gate, try a goal again that plans do not reach, where `ask` raises.
+        may_repeat: Without a gate, repeat plans that do not reach a goal; `ask` raises instead.
 
     Returns:
         The open trial of each, in order.
 
     Raises:
-        ConfigurationError: A session stands there twice.
+        ConfigurationError: A session is given twice.
     """
     if len({id(session) for session in sessions}) < len(sessions):
         raise ConfigurationError("sessions asked together must be different ones")
     for session in sessions:
         state = session.state
-        if state.open_trial is None:  # load before the log is held: others need not wait for it
+        if state.open_trial is None:  # load before holding the log, so that others need not wait
             session._parts(state).load()
-            latest_goal(state)  # or refuse
+            latest_goal(state)  # raises if there is none
     with ExitStack() as logs:
         asked, new = list[tuple[SessionState, int]](), dict[Session, SessionState]()
         for session in sessions:
@@ -437,13 +436,13 @@ def ask_all(sessions: Sequence[Session], *, may_repeat: bool = True) -> list[Tri
             asked.append((state, len(state.trials) + (session in new)))
         verdicts: dict[Session, Verdict | None] = {}
         if new:
-            parts = [s._parts(state).believed(state, s.log) for s, state in new.items()]
+            parts = [s._parts(state).trusted(state, s.log) for s, state in new.items()]
             goals = [latest_goal(state).goal for state in new.values()]
             conditions = [each.adapter.propose(g) for each, g in zip(parts, goals, strict=True)]
-            plans = generated([each.generator for each in parts], conditions)
+            plans = generate_plans([each.generator for each in parts], conditions)
             opened = zip(new.items(), parts, conditions, plans, strict=True)
             for (session, state), each, condition, plan in opened:
-                verdicts[session] = session._open(state, each, condition, plan, may_repeat)
+                verdicts[session] = session._open_trial(state, each, condition, plan, may_repeat)
     return [
         session._with_plan(state, number, verdicts)
         for session, (state, number) in zip(sessions, asked, strict=True)

@@ -1,7 +1,7 @@
-"""What a session knows: its goals and trials, as the fold of a log of events.
+"""Goals and trials of a session: the fold of a log of events.
 
-What stands is `SessionState`, so a session can be brought back from its log alone. `Log` keeps
-the events in a list; a workspace's keeps a journal on disk.
+`SessionState` follows from the events alone, so a session can be restored from its log. `Log` keeps
+the events in a list; the log of a workspace keeps a journal on disk.
 """
 
 from __future__ import annotations
@@ -30,31 +30,31 @@ from prior_reinforce.session.events import Amended, Asked, Entry, Event, GoalSet
 
 
 class Verdict(Protocol):
-    """What a gate says of a plan; see `arm.robots.report.LimitReport`."""
+    """Verdict of a gate on a plan; see `arm.robots.report.LimitReport`."""
 
     def require(self) -> None:
         """Raise RobotLimitError unless the plan may be executed."""
 
     def text(self) -> str:
-        """The same for a person."""
+        """Return the verdict as text for a person."""
 
     def as_json(self) -> dict[str, Any]:
-        """The same as plain data, for the log."""
+        """Return the verdict as plain data for the log."""
 
 
 class Stage(Enum):
-    """Where a trial stands."""
+    """Stage of a trial."""
 
     ASKED = "asked"
-    """Its plan was generated; its outcome has not been told."""
+    """Its plan was generated; its outcome is not told yet."""
     TOLD = "told"
-    """What was seen of it was told."""
+    """Its reading was told."""
     VOIDED = "voided"
     """Not data: the ball slipped, the arm stopped, nothing was seen."""
 
 
-_NEWS = 4.0
-"""A reading is a surprise from so many standard deviations on (ours): of 398 trials in which
+_SURPRISE = 4.0
+"""Least surprising error of a prediction, in standard deviations (ours): of 398 trials in which
 nothing happened, on our own tasks and four others', three were, and one in thirty lay beyond 3."""
 
 
@@ -67,87 +67,87 @@ class Goal:
     goal: Point
     """g, in the outcomes' units."""
     format: OutcomeFormat
-    """What its numbers mean, with the tolerance."""
+    """Names, units and tolerance of its components."""
     carry_over: bool = False
     """Whether the adapter also learns from the trials of earlier goals."""
     adapter: str = ""
-    """The adapter's name; empty where the session was given one by hand."""
+    """The adapter's name; empty if the session was given an object."""
     new_hardware: str | None = None
-    """What was changed on the hardware before its first trial; None where nothing was."""
+    """Note on the hardware change before its first trial; None if there was none."""
 
     def is_hit(self, error: Point) -> bool:
-        """Whether an error, outcome minus goal, counts as reached."""
+        """Return whether an error, outcome minus goal, is a hit."""
         return in_tolerances(error, self.tolerance) <= 1.0
 
     @property
     def tolerance(self) -> Point:
-        """Epsilon of each component, in its unit."""
+        """Epsilon of each component, in the component's unit."""
         return self.format.half_axes
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One Stage-2 trial. Never changed; the session replaces it by another as it proceeds."""
+    """One Stage-2 trial. Immutable; the session replaces it by another as it proceeds."""
 
     number: int
     """From 1, over all goals of the session, in the order in which trials were asked for."""
     goal_number: int
-    """The goal that it was asked for."""
+    """Number of its goal."""
     condition: Point
     """c = M(g); read-only."""
     plan: Frames = field(default_factory=lambda: np.empty((0, 0)))
     """A = pi(c), shape (H, D), read-only; no rows in a trial that was read back from a log."""
     stage: Stage = Stage.ASKED
     reading: Reading | None = None
-    """What was said of it; None unless told."""
+    """What was perceived; None unless told."""
     hit: bool = False
-    """Whether the goal was reached: as seen, or judged from the error."""
+    """Whether the goal was reached: seen directly, or judged by the perceived error."""
     note: str = ""
     """Why it was voided."""
     told_before: bool = False
-    """Whether it is voided, and was told until then: a person may have meant another trial."""
+    """Whether it was told before it was voided: a person may have meant another trial."""
     outdated: bool = False
-    """Whether a reading that it was planned from was amended or voided while it waited."""
+    """Whether a reading used for its plan was amended or voided while it was open."""
     expected: base.Expectation = field(default_factory=base.Expectation)
-    """What its adapter expected of it; `beyond` also where the gate lets no plan so far."""
+    """Prediction by its adapter; `beyond` also if the gate passes no plan so far."""
     model: str = ""
-    """Which model planned it: the name of its folder in a workspace, else empty."""
+    """Model that generated its plan: the name of its folder in a workspace, else empty."""
     gate: dict[str, Any] | None = None
     """The gate's verdict when the trial was asked for, as plain data."""
     verdict: Verdict | None = None
-    """The gate's verdict of now, on a trial that `Session.ask` returned; None without a gate."""
+    """The gate's verdict when `Session.ask` returned the trial; None without a gate."""
     asked_at: str = ""
-    """When it was asked for, ISO 8601, UTC; empty where the log is in memory."""
+    """When it was asked for, ISO 8601, UTC; empty if the log is in memory."""
     told_at: str = ""
     """When its reading was told or amended last, likewise; empty unless told."""
 
     def __repr__(self) -> str:
-        said = [f"{self.number} for goal {self.goal_number}", self.stage.value]
-        said.append(f"condition {np.round(self.condition, 4).tolist()}")
+        parts = [f"{self.number} for goal {self.goal_number}", self.stage.value]
+        parts.append(f"condition {np.round(self.condition, 4).tolist()}")
         if self.error_seen is not None:
-            said.append(f"error {np.round(self.error_seen, 4).tolist()}")
+            parts.append(f"error {np.round(self.error_seen, 4).tolist()}")
         if self.reading is not None:
-            said.append("hit" if self.hit else "miss")
+            parts.append("hit" if self.hit else "miss")
         if len(self.plan):
-            said.append(f"plan {' x '.join(map(str, self.plan.shape))}")
-        return f"Trial({', '.join(said)})"
+            parts.append(f"plan {' x '.join(map(str, self.plan.shape))}")
+        return f"Trial({', '.join(parts)})"
 
     @property
     def error_seen(self) -> Point | None:
-        """The error e tilde, outcome minus goal as perceived; None unless told where it ended."""
+        """The perceived error e tilde, outcome minus goal; None if the outcome is unknown."""
         reading = self.reading
         return reading.error_seen if reading is not None and reading.has_place else None
 
     @property
     def surprise(self) -> str:
-        """What is odd about what was told of it, and what to do about that; empty where nothing."""
+        """How far its reading is from the prediction, and what to do; empty without surprise."""
         reading, error, sd = self.reading, self.expected.error, self.expected.sd
         if reading is None or error is None or sd is None:
             return ""
         low, high = reading.low - error, error - reading.high
         off = np.maximum(np.maximum(low, high), 0.0) / np.hypot(sd, reading.sd)
         sds, n = float(np.linalg.norm(off)), self.number
-        if sds < _NEWS:
+        if sds < _SURPRISE:
             return ""
         return (
             f"{sds:.0f} standard deviations from the prediction (a typo? amend {n}; other "
@@ -156,30 +156,30 @@ class Trial:
 
     @property
     def open(self) -> bool:
-        """Whether the trial still waits to be told or voided."""
+        """Whether the trial is neither told nor voided."""
         return self.stage is Stage.ASKED
 
     @property
     def amendable(self) -> bool:
-        """Whether it was told, be it voided since, so that this can be corrected."""
+        """Whether it was told, even if voided since: its reading can be corrected."""
         return self.stage is Stage.TOLD or self.told_before
 
 
-def told_of(trials: Iterable[Trial]) -> tuple[Trial, ...]:
-    """Return the trials that count; voided and open ones do not (paper, Evaluation Protocol)."""
+def told_trials(trials: Iterable[Trial]) -> tuple[Trial, ...]:
+    """Return the trials that count: neither voided nor open (paper, Evaluation Protocol)."""
     return tuple(trial for trial in trials if trial.stage is Stage.TOLD)
 
 
 def trials_to_hit(trials: Iterable[Trial]) -> int | None:
-    """How many trials that count it took, up to and with the first hit; None where none hit."""
-    return next((n for n, trial in enumerate(told_of(trials), start=1) if trial.hit), None)
+    """Return the number of counted trials up to and including the first hit; None without a hit."""
+    return next((n for n, trial in enumerate(told_trials(trials), start=1) if trial.hit), None)
 
 
 class SessionState:
-    """What the events of a log add up to, folded forward one event at a time.
+    """State of a session: the fold of its events, one at a time.
 
-    Trials of one goal follow each other, and only the last trial can be open, so that taking in an
-    event and asking what stands cost the same however many came before.
+    Trials of one goal are consecutive, and only the last trial can be open. So the cost of an event
+    or a query does not grow with the number of trials.
     """
 
     def __init__(self) -> None:
@@ -190,31 +190,31 @@ class SessionState:
 
     @property
     def in_use(self) -> tuple[str, ...]:
-        """Name of the model in use, and of whatever else a session loads."""
+        """Names of the model in use, and of whatever else a session loads."""
         return ("",)
 
     @property
     def goal(self) -> Goal | None:
-        """The goal that is worked on: the latest."""
+        """The latest goal."""
         return self.goals[-1] if self.goals else None
 
     @property
     def open_trial(self) -> Trial | None:
-        """The trial that waits to be told, if any: it is the last one."""
+        """The open trial, if any; it is the last one."""
         return self.trials[-1] if self.trials and self.trials[-1].open else None
 
     @property
     def solved(self) -> bool:
-        """Whether a told trial reached the goal that is worked on."""
+        """Whether a told trial reached the latest goal."""
         return any(trial.hit for trial in self.current)
 
     @property
     def current(self) -> tuple[Trial, ...]:
-        """Trials for the goal that is worked on, in order."""
+        """Trials for the latest goal, in order."""
         return self.trials_of(len(self.goals)) if self.goals else ()
 
     def trial(self, number: int) -> Trial:
-        """Return a trial of any goal as it stands; TrialStateError if there is no such trial."""
+        """Return a trial of any goal; TrialStateError if there is no such trial."""
         if not isinstance(number, Integral) or isinstance(number, bool):
             raise TrialStateError(
                 f"a trial's number is a whole number, got {number!r}; give .number"
@@ -226,25 +226,24 @@ class SessionState:
         return self.trials[number - 1]
 
     def goal_of(self, trial: Trial) -> Goal:
-        """The goal that a trial was asked for."""
+        """Return the goal of a trial."""
         return self.goals[trial.goal_number - 1]
 
     def trials_of(self, goal_number: int) -> tuple[Trial, ...]:
-        """Trials of one goal, in order."""
+        """Return the trials of one goal, in order."""
         latest = goal_number == len(self.goals)
         end = len(self.trials) if latest else self._n_before[goal_number]
         return tuple(self.trials[self._n_before[goal_number - 1] : end])
 
     def readings_for(self, goal: Goal, model: str) -> list[Trial]:
-        """Told trials that an adapter learns from for a goal, oldest first.
+        """Return the told trials that an adapter learns from for a goal, oldest first.
 
-        Those of the goal, and of earlier ones where they are carried over, as far as this model
-        planned them.
+        These are the trials of this model for the goal, and for earlier goals if carried over.
         """
         return [trial for trial in self.trials if _teaches(trial, goal, model)]
 
     def refuse_open_trial(self, doing: str) -> None:
-        """Do nothing unless a trial waits to be told; TrialStateError if one does."""
+        """Raise TrialStateError if a trial is open."""
         trial = self.open_trial
         if trial is not None:
             raise TrialStateError(
@@ -252,7 +251,7 @@ class SessionState:
             )
 
     def add(self, entry: Entry) -> None:
-        """Take in the next event; WorkspaceError if it cannot follow the others."""
+        """Fold in the next event; WorkspaceError if it cannot follow the others."""
         try:
             self._apply(entry.event, entry.time)
         except (IndexError, ValueError, PriorReinforceError) as error:
@@ -293,11 +292,11 @@ class SessionState:
             case Amended():
                 if not self.trial(event.trial).amendable:
                     raise ValueError(f"trial {event.trial} has not been told")
-                self._correct(self._told(event, time))
+                self._correct(self._with_reading(event, time))
             case Told():
                 if not self.trial(event.trial).open:
                     raise ValueError(f"trial {event.trial} is not open")
-                self.trials[event.trial - 1] = self._told(event, time)
+                self.trials[event.trial - 1] = self._with_reading(event, time)
             case Voided():
                 trial = self.trial(event.trial)
                 void = replace(trial, stage=Stage.VOIDED, told_before=trial.amendable)
@@ -305,7 +304,7 @@ class SessionState:
             case _:
                 raise ValueError("no event of a session")
 
-    def _told(self, event: Told, time: str) -> Trial:
+    def _with_reading(self, event: Told, time: str) -> Trial:
         trial = self.trial(event.trial)
         reading = Reading.from_record(event.reading)
         if reading.error_seen.size != self.goal_of(trial).goal.size:
@@ -314,12 +313,12 @@ class SessionState:
         return replace(told, reading=reading, hit=event.hit)
 
     def _correct(self, corrected: Trial) -> None:
-        """Replace a trial, and mark the open one if it was planned from what is corrected now."""
+        """Replace a trial; mark the open one as outdated if its plan used the corrected reading."""
         before, waiting = self.trial(corrected.number), self.open_trial
         if (
             waiting is not None
             and not before.open
-            and _meaning(before) != _meaning(corrected)
+            and _content(before) != _content(corrected)
             and any(
                 _teaches(trial, self.goal_of(waiting), waiting.model)
                 for trial in (before, corrected)
@@ -330,65 +329,66 @@ class SessionState:
 
 
 class Log:
-    """Events of a session, and what they add up to; here, as long as the program lasts."""
+    """Events of a session and the state they add up to, kept in memory."""
 
     def __init__(self) -> None:
         self._entries: list[Entry] = []
         self._state = SessionState()
 
     def entries(self) -> Sequence[Entry]:
-        """All events so far, in order, whoever wrote them."""
+        """Return all events so far, in order, whoever wrote them."""
         return self._entries
 
     def state(self) -> SessionState:
-        """What happened so far, whoever wrote it.
+        """Return the state after all events, whoever wrote them.
 
         WorkspaceError if the events do not fit together, or cannot be read.
         """
         return self._state
 
     def exclusive(self) -> AbstractContextManager[object]:
-        """Hold the log for reading and then appending; what is appended is kept when it ends."""
+        """Hold the log for reading and appending; events are saved when the context ends."""
         return nullcontext()  # nobody else can append
 
     def append(self, event: Event) -> None:
-        """Add an event; called within `exclusive`."""
+        """Append an event; called within `exclusive`."""
         self._add(Entry(len(self._entries) + 1, event))
 
     def _add(self, entry: Entry) -> None:
-        """Fold the next event into the state; one that does not fit changes nothing."""
+        """Fold the next event into the state; an invalid event changes nothing."""
         self._state.add(entry)
         self._entries.append(entry)
 
     def append_asked(self, event: Asked, plan: Frames, form: PlanFormat) -> None:
-        """Add a new trial and keep its plan; called within `exclusive`.
+        """Append a new trial with its plan; called within `exclusive`.
 
-        In memory a plan may have numbers that no arm has: a simulation loses its object for it.
+        In memory a plan may have numbers that no arm can execute: a simulation then loses its
+        object.
         """
         self.append(event)
         self._state.trials[-1] = replace(self._state.trials[-1], plan=_read_only(plan))
 
     def keep_adapter(self, adapter: base.Adapter) -> None:
-        """Keep what an adapter knows, for programs to come; called within `exclusive`."""
+        """Save the state of an adapter for later programs; called within `exclusive`."""
 
     def kept_adapter(self) -> base.State | None:
-        """State of the adapter that was kept last."""
+        """Return the state that was saved last."""
         return None
 
     def plan(self, trial: Trial) -> Frames:
-        """Return the plan that was kept of a trial."""
+        """Return the saved plan of a trial."""
         return trial.plan
 
 
 def _teaches(trial: Trial, goal: Goal, model: str) -> bool:
-    """Whether an adapter learns from a trial for a goal; see `SessionState.readings_for`."""
+    """Whether an adapter learns from a trial; see `SessionState.readings_for`."""
     of_goal = trial.goal_number == goal.number
     earlier = goal.carry_over and trial.goal_number < goal.number
     return trial.stage is Stage.TOLD and trial.model == model and (of_goal or earlier)
 
 
-def _meaning(trial: Trial) -> object:
-    """What was seen of a trial, in whatever words; None unless told."""
+def _content(trial: Trial) -> object:
+    """Reading and hit of a trial, regardless of the words; None unless told."""
     reading = trial.reading
     return None if reading is None else (replace(reading, said="").record(), trial.hit)
 

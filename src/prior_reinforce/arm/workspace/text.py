@@ -12,7 +12,7 @@ from prior_reinforce.arm.workspace.events import Moved, Moving
 from prior_reinforce.arm.workspace.manifest import Manifest, workspace_around
 from prior_reinforce.arm.workspace.state import Standing, WorkspaceState
 from prior_reinforce.errors import TrialStateError
-from prior_reinforce.session.trials import SessionState, Trial, told_of
+from prior_reinforce.session.trials import SessionState, Trial, told_trials
 from prior_reinforce.terminal import plain
 from prior_reinforce.wording import error_example, say_chance, say_reading, say_trials
 
@@ -70,7 +70,7 @@ def say_expectation(now: Standing, trial: Trial) -> list[str]:
         lines[0] += f"; {say_trials(expected.trials)} trials to go"
     if expected.remark:
         lines.append(expected.remark)
-    told = told_of(state.trials)
+    told = told_trials(state.trials)
     shown, moved = state.demonstrations, now.manifest.symmetry
     if not told and shown is not None and shown.n == 1 and moved and expected.sd is not None:
         form = now.manifest.outcome_format
@@ -101,7 +101,7 @@ def say_left_out(state: WorkspaceState) -> list[str]:
     """Say how many trials would teach for the goal of now, had this model planned them."""
     goal, model = state.goal, state.in_use[0]
     trials = state.trials if goal is not None and goal.carry_over else state.current
-    n = sum(trial.model != model for trial in told_of(trials))
+    n = sum(trial.model != model for trial in told_trials(trials))
     planned = "a trial of another model teaches" if n == 1 else f"{n} trials of other models teach"
     return [f"{planned} this one nothing"] if n else []
 

@@ -26,7 +26,7 @@ from prior_reinforce.arm.workspace.text import (
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError
 from prior_reinforce.files import as_cell
 from prior_reinforce.formats import OutcomeFormat
-from prior_reinforce.session.trials import Goal, Trial, told_of, trials_to_hit
+from prior_reinforce.session.trials import Goal, Trial, told_trials, trials_to_hit
 from prior_reinforce.terminal import plain
 from prior_reinforce.wording import (
     as_html,
@@ -321,7 +321,7 @@ def _goal_view(state: WorkspaceState, goal: Goal) -> GoalView:
         adapter=goal.adapter,
         earlier_trials=goal.carry_over,
         new_hardware=goal.new_hardware,
-        told=len(told_of(trials)),
+        told=len(told_trials(trials)),
         reached_after=trials_to_hit(trials),
         demonstrations=0 if (shown := state.shown_for(goal)) is None else shown.n,
     )

@@ -34,9 +34,9 @@ _RIVAL = "rival"
 
 
 def check_parts(generator: object, adapter: object, demonstrations: object) -> None:
-    """Do nothing if each is an object of its kind, or a function that loads one.
+    """Raise ConfigurationError unless each is an object of its kind, or a function that loads one.
 
-    ConfigurationError for a class, a name, or two that are exchanged.
+    So for a class, a name, or exchanged arguments.
     """
     kinds = (
         (generator, Generator, "pr.make_generator({!r})"),
@@ -53,83 +53,83 @@ def check_parts(generator: object, adapter: object, demonstrations: object) -> N
             raise ConfigurationError(f"{given!r:.60} is no {kind.__name__}; give one{made}")
 
 
-class InUse:
-    """Generator, adapter and demonstrations while the log names the same; loaded when needed."""
+class Parts:
+    """Generator, adapter and demonstrations of one name in the log, loaded when first needed."""
 
     def __init__(self, given: Any, names: tuple[str, ...]) -> None:
         self._given = given
         self.names = names
-        """Of the model, of whatever else is loaded, and of the adapter."""
+        """Names of the model, of whatever else is loaded, and of the adapter."""
 
     @cached_property
     def generator(self) -> Generator:
         """The generator pi."""
-        return _loaded(self._given[0])
+        return _load(self._given[0])
 
     @cached_property
     def adapter(self) -> Adapter:
         """The adapter M."""
-        return _loaded(self._given[1])
+        return _load(self._given[1])
 
     @cached_property
     def demonstrations(self) -> Demonstrations:
         """The demonstrations D_prior."""
-        return _loaded(self._given[2])
+        return _load(self._given[2])
 
     @cached_property
-    def rival(self) -> InUse | None:
-        """The same by the rival that the symmetry states, learned now; None where there is none."""
+    def rival(self) -> Parts | None:
+        """Parts learned now with the rival of the declared symmetry; None if it has no rival."""
         declared = self.demonstrations.symmetry
         if declared is None or declared.rival is None:
             return None
-        shown = self.demonstrations.with_symmetry(declared.rival)
-        learned = copy.deepcopy(self.generator).fit(shown, seed=0)
-        return InUse((learned, copy.deepcopy(self.adapter), shown), (_RIVAL, *self.names[1:]))
+        demonstrations = self.demonstrations.with_symmetry(declared.rival)
+        generator = copy.deepcopy(self.generator).fit(demonstrations, seed=0)
+        given = generator, copy.deepcopy(self.adapter), demonstrations
+        return Parts(given, (_RIVAL, *self.names[1:]))
 
-    def believed(self, state: SessionState, log: Log) -> InUse:
-        """This, or its rival where trials speak against the symmetry; the adapter is informed."""
-        doubted = self.informed(state, log).symmetry_doubted
-        if not doubted or self.rival is None:
+    def trusted(self, state: SessionState, log: Log) -> Parts:
+        """Return these parts, or the rival if trials contradict the symmetry; update adapters."""
+        if not self.update_adapter(state, log).symmetry_doubted or self.rival is None:
             return self
-        self.rival.informed(state, log)
+        self.rival.update_adapter(state, log)
         return self.rival
 
     def load(self) -> tuple[Generator, Adapter]:
-        """What a new trial needs."""
+        """Load what a new trial needs."""
         return self.generator, self.adapter
 
-    def informed(self, state: SessionState, log: Log) -> Adapter:
-        """The adapter, after it was told all that counts for the goal of now.
+    def update_adapter(self, state: SessionState, log: Log) -> Adapter:
+        """Return the adapter after all observations that count for the latest goal.
 
-        It goes on from what it knows, or from what the log kept of it, if that is the beginning of
-        what it is to be told, and starts again if not: a trial may have been voided or amended, or
-        another session have used the adapter.
+        It continues from its own state, or from the one in the log, if that follows from the first
+        of these observations. Otherwise it starts again: a trial may have been voided or amended,
+        or another session may have used the adapter.
         """
-        adapter, told = self.adapter, list(_told(state, self.names[0]))
-        shown = self.generator.with_symmetry_used(self.demonstrations)
-        keys = [adapter.first_key(shown)]
-        for what, arguments in told:
-            keys.append(next_key(keys[-1], what, *arguments))
+        adapter, calls = self.adapter, list(_adapter_calls(state, self.names[0]))
+        demonstrations = self.generator.with_symmetry_used(self.demonstrations)
+        keys = [adapter.first_key(demonstrations)]
+        for method, arguments in calls:
+            keys.append(next_key(keys[-1], method, *arguments))
         if adapter.key not in keys:
             kept = log.kept_adapter()
             if kept is not None and kept.key in keys:
-                adapter.resume(shown, kept)
+                adapter.resume(demonstrations, kept)
             else:
-                adapter.start(shown)
-        for what, arguments in told[keys.index(adapter.key) :]:
-            getattr(adapter, what)(*arguments)
+                adapter.start(demonstrations)
+        for method, arguments in calls[keys.index(adapter.key) :]:
+            getattr(adapter, method)(*arguments)
         return adapter
 
-    def _expected(self, state: SessionState, condition: Point) -> Expectation:
-        """What the adapter expects of the next trial."""
+    def _expect(self, state: SessionState, condition: Point) -> Expectation:
+        """Prediction of the next trial by the adapter."""
         goal = latest_goal(state)
         return self.adapter.expect(condition, goal.goal, goal.tolerance)
 
-    def _asked(
+    def _asked_event(
         self, state: SessionState, condition: Point, verdict: Verdict | None, limited: str = ""
     ) -> Asked:
-        """The event of the next trial; `limited` says why it falls short of what was wanted."""
-        expected = self._expected(state, condition)
+        """Event of the next trial; `limited` says why its plan falls short of the wanted one."""
+        expected = self._expect(state, condition)
         remarks = filter(None, (limited, self._remark(state, expected)))
         beyond = bool(limited) or (expected.beyond and not expected.nearer)
         return Asked(
@@ -142,7 +142,7 @@ class InUse:
         )
 
     def _remark(self, state: SessionState, expected: Expectation) -> str:
-        """What a person should know before a trial."""
+        """What a person should know before the next trial."""
         if expected.nearer:
             goal = latest_goal(state)
             n = [
@@ -155,10 +155,10 @@ class InUse:
                 f"kept nearer to the demonstration, since trial {n} was lost; void {n} if that was "
                 "no fault of the motion"
             )
-        return expected.remark or self._taken_back()
+        return expected.remark or self._rival_remark()
 
-    def _taken_back(self) -> str:
-        """What is said where the declared axis was left; nothing where it was not."""
+    def _rival_remark(self) -> str:
+        """Say that the rival of the declared symmetry is used, if it is."""
         if self.names[0] != _RIVAL:
             return ""
         symmetry = self.demonstrations.symmetry
@@ -169,7 +169,7 @@ class InUse:
             f"({symmetry.name}{about}); declare that one"
         )
 
-    def passing(
+    def next_trial(
         self,
         state: SessionState,
         wanted: Point,
@@ -178,11 +178,12 @@ class InUse:
         *,
         may_repeat: bool,
     ) -> tuple[Asked, Frames, Any]:
-        """The next trial, its plan and verdict: as wanted, or the last that passes towards that.
+        """Return the next trial, its plan and verdict: of the wanted condition, if its plan passes.
 
+        Else of the farthest condition from the goal towards the wanted one whose plan passes.
         OutOfReachError if plans do not reach the goal, and this one was tried and missed, unless it
-        may be repeated; RobotLimitError if it does not pass, and the goal's own plan does not
-        either, or the last that passes was tried and missed.
+        may be repeated; RobotLimitError if no plan passes, not even that for the goal as condition,
+        or if the farthest one that passes was tried and missed.
         """
 
         def check(plan: Frames, condition: Point) -> str:
@@ -195,58 +196,58 @@ class InUse:
         goal, generator = latest_goal(state).goal, self.generator
         nearer = f"demonstrate nearer to {say_place(goal, self.demonstrations.outcome_format)}"
         try:
-            verdict = verdict_on(plan, wanted, self._say_no_plan(state, wanted))
+            verdict = verdict_on(plan, wanted, self._refusal(state, wanted))
         except RobotLimitError as error:
             if np.array_equal(wanted, goal) or refusal(generator, goal, check):
                 raise
-            nearest = farthest_between(generator, goal, wanted, check)
-            if n := _missed(state, nearest):
-                said = f"{error.problem}; trial {n} went as far as passes, and missed: {nearer}"
-                raise RobotLimitError(said) from error
-            (plan,) = generator.generate(nearest[None])
-            own = error.__cause__  # the verdict's
-            assert isinstance(own, RobotLimitError)
-            limited = f"moved only as far as passes, which may not do ({own.problem}); {nearer}"
-            verdict = verdict_on(plan, nearest, self._say_no_plan(state, nearest))
-            return self._asked(state, nearest, verdict, limited), plan, verdict
-        if not may_repeat and (n := _missed(state, wanted)):
-            expected = self._expected(state, wanted)
+            passing = farthest_between(generator, goal, wanted, check)
+            if n := _miss_of_same_plan(state, passing):
+                problem = f"{error.problem}; trial {n} went as far as passes, and missed: {nearer}"
+                raise RobotLimitError(problem) from error
+            (plan,) = generator.generate(passing[None])
+            cause = error.__cause__  # raised by the verdict
+            assert isinstance(cause, RobotLimitError)
+            limited = f"moved only as far as passes, which may not do ({cause.problem}); {nearer}"
+            verdict = verdict_on(plan, passing, self._refusal(state, passing))
+            return self._asked_event(state, passing, verdict, limited), plan, verdict
+        if not may_repeat and (n := _miss_of_same_plan(state, wanted)):
+            expected = self._expect(state, wanted)
             if expected.beyond:
                 raise OutOfReachError(f"trial {n} made the same plan and missed: {expected.remark}")
-        return self._asked(state, wanted, verdict), plan, verdict
+        return self._asked_event(state, wanted, verdict), plan, verdict
 
-    def _say_no_plan(self, state: SessionState, condition: Point) -> str:
-        """Say for which goal there is no plan, and whether it is simply too far."""
+    def _refusal(self, state: SessionState, condition: Point) -> str:
+        """Say for which goal there is no plan, and whether it is far from the demonstrations."""
         goal = latest_goal(state).goal
         form = self.demonstrations.outcome_format
         place, at = (say_place(point, form) for point in (goal, condition))
-        said = f"no plan for the goal {place}"
+        text = f"no plan for the goal {place}"
         if at != place:
-            said += f", for which the plan would aim at {at}"
+            text += f", for which the plan would aim at {at}"
         if np.any(self.demonstrations.far_outside(goal)):
-            said += ", which lies far outside the demonstrations (choose one nearer to them)"
-        return said
+            text += ", which lies far outside the demonstrations (choose one nearer to them)"
+        return text
 
 
-def _told(state: SessionState, model: str) -> Iterator[tuple[str, tuple[Any, ...]]]:
-    """What an adapter is to be told for the goal of now: its methods, and their arguments."""
-    goal, hardware = latest_goal(state), 0
+def _adapter_calls(state: SessionState, model: str) -> Iterator[tuple[str, tuple[Any, ...]]]:
+    """Calls of the adapter's methods, with arguments, that count for the latest goal."""
+    goal, n_announced = latest_goal(state), 0
     for trial in [*state.readings_for(goal, model), None]:
-        about = goal if trial is None else state.goal_of(trial)
-        for each in state.goals[hardware : about.number]:
+        of_trial = goal if trial is None else state.goal_of(trial)
+        for each in state.goals[n_announced : of_trial.number]:
             if each.new_hardware is not None:
                 yield "change_hardware", ()
-        hardware = max(hardware, about.number)
+        n_announced = max(n_announced, of_trial.number)
         if trial is not None:
             assert trial.reading is not None
             reading = trial.reading
             if reading.said and reading.hit is None and not trial.hit:
                 reading = reading.with_hit(False)  # whoever watched it and names no hit saw a miss
-            yield "observe", (trial.condition, about.goal, reading.within(about.tolerance))
+            yield "observe", (trial.condition, of_trial.goal, reading.within(of_trial.tolerance))
 
 
-def _missed(state: SessionState, condition: Point) -> int:
-    """Number of a trial for the goal of now that made the same plan and was seen to miss, or 0."""
+def _miss_of_same_plan(state: SessionState, condition: Point) -> int:
+    """Number of a trial for the latest goal that missed with the same plan, or 0."""
     tolerance = latest_goal(state).tolerance
     return next(
         (
@@ -260,29 +261,29 @@ def _missed(state: SessionState, condition: Point) -> int:
 
 
 def latest_goal(state: SessionState) -> Goal:
-    """The goal that is worked on; WorkspaceError if none is set."""
+    """Return the latest goal; WorkspaceError if none is set."""
     if state.goal is None:
         raise WorkspaceError("no goal is set; set one (Session.set_goal, or: prior-reinforce goal)")
     return state.goal
 
 
-def _loaded(given: Any) -> Any:
-    """What was given, or what the loader that was given returns; a network is callable too."""
+def _load(given: Any) -> Any:
+    """Return an object, or what its loader returns; a network is callable and no loader."""
     return given() if callable(given) and not isinstance(given, (Generator, Adapter)) else given
 
 
-def generated(generators: Sequence[Generator], conditions: Sequence[Point]) -> list[Frames]:
+def generate_plans(generators: Sequence[Generator], conditions: Sequence[Point]) -> list[Frames]:
     """Return a plan for each condition, with one call of each generator.
 
-    InvalidPlanError if a generator gives what is no number.
+    InvalidPlanError if a plan has numbers that are not finite.
     """
     plans: dict[int, Frames] = {}
     for generator in {id(each): each for each in generators}.values():
         own = [i for i, each in enumerate(generators) if each is generator]
-        made = generator.generate(np.stack([conditions[i] for i in own]))
-        if not np.all(np.isfinite(made)):
+        new = generator.generate(np.stack([conditions[i] for i in own]))
+        if not np.all(np.isfinite(new)):
             raise InvalidPlanError(
                 "the generator gives plans that hold no numbers (nan or inf); learn again"
             )
-        plans.update(zip(own, made, strict=True))
+        plans.update(zip(own, new, strict=True))
     return [plans[i] for i in range(len(generators))]
