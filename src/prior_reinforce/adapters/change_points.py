@@ -151,9 +151,8 @@ def infer_posteriors(
     """
     m, n_histories = len(base), len(histories)
     base = base + prior.noise_variance[:, None, None] * np.eye(len(memory.numbers))
-    covariance = np.concatenate(
-        [base + h.change_covariance(prior, memory, memory) for h in histories]
-    )
+    of_changes = [history.change_covariance(prior, memory, memory) for history in histories]
+    covariance = np.concatenate([base + added for added in of_changes])
     each = [_readings(prior, memory, h.mistaken) for h in histories]
     low = np.repeat([readings.low for readings in each], m, axis=0)
     high = np.repeat([readings.high for readings in each], m, axis=0)

@@ -255,7 +255,7 @@ class DisplacedTrials:
         shares = np.exp(logs - logs.max())
         return zip((shares / shares.sum()).tolist(), self._histories, strict=True)
 
-    def _predictions(
+    def _predict(
         self, inputs: Inputs
     ) -> Iterator[tuple[float, np.ndarray, np.ndarray, np.ndarray]]:
         """Probability, model weights, mean and variance of each history."""
@@ -266,7 +266,7 @@ class DisplacedTrials:
     def _moments(self, inputs: Inputs) -> tuple[Points, Points]:
         """Mean and variance of displacements over all histories and models."""
         total, square = np.zeros((2, *inputs.conditions.shape))
-        for probability, weights, mean, variance in self._predictions(inputs):
+        for probability, weights, mean, variance in self._predict(inputs):
             total += np.einsum("mk,mkp->pk", probability * weights, mean)
             square += np.einsum("mk,mkp->pk", probability * weights, variance + mean**2)
         return total, square - total**2
@@ -284,7 +284,7 @@ class DisplacedTrials:
             misses = Targets(missed.to_goal, missed.missed_by)
             return p_hit_given_misses(predictions, misses, targets, self.config.outlier, seed)
         total, half_axes = np.zeros(len(inputs.numbers)), radius[:, None]
-        for probability, weights, mean, variance in self._predictions(inputs):
+        for probability, weights, mean, variance in self._predict(inputs):
             off, sd = (mean - to_goal.T) / half_axes, np.sqrt(variance) / half_axes
             total += probability * ball_probability(off, sd, weights)
         return total

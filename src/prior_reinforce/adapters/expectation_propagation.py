@@ -37,10 +37,9 @@ _SWEEPS = 15
 _DAMPING = 0.8
 """Share of each update that is applied (ours): undamped parallel updates may oscillate."""
 _CONVERGED = 1e-3
-"""Sites have converged if an update would move no posterior mean by more, in posterior standard
-deviations (ours)."""
+"""Posterior standard deviations by which an update of converged sites may move a mean (ours)."""
 _OSCILLATING = 0.5
-"""Sites oscillate if the last update would still move a mean by more (ours)."""
+"""The same beyond which sites oscillate after the last update (ours)."""
 _EVIDENCE_LOSS = 5.0
 """Most log evidence that updates may lose; more means that they led to another mode (ours)."""
 _NEGLIGIBLE = 1e-4
@@ -52,20 +51,20 @@ _FARTHEST = 37.0
 """Standard deviations beyond which the normal distribution is 0 in floating point."""
 _TINY = 1e-290
 
-Vectors = Float[np.ndarray, "*#of n"]
+Vector = Float[np.ndarray, "*#of n"]
 """A number for each latent, mostly under m models and for k outputs."""
-Matrices = Float[np.ndarray, "*#of n n"]
+Matrix = Float[np.ndarray, "*#of n n"]
 
 
 @dataclass(frozen=True, eq=False)
 class Readings:
     """Intervals that were read, a row for each output: shape (k, n), or (m, k, n) for m models."""
 
-    low: Vectors
+    low: Vector
     """Least value; may be -inf."""
-    high: Vectors
+    high: Vector
     """Greatest value; may be inf, equal to `low` where a number was read."""
-    variance: Vectors
+    variance: Vector
     """v, positive."""
     outlier: float = 0.01
     """e, probability that a reading says nothing."""
@@ -89,13 +88,13 @@ class Readings:
 class Posterior:
     """The posterior of the latents, for m models and k outputs."""
 
-    tau: Vectors
+    tau: Vector
     """Precision of each site."""
-    nu: Vectors
+    nu: Vector
     """Precision times mean of each site."""
-    weights: Vectors
+    weights: Vector
     """E d(x) = k(x)' weights, k(x) being prior covariances with the latents."""
-    precision: Matrices
+    precision: Matrix
     """(K + diag(1 / tau))^-1: Var d(x) = k(x, x) - k(x)' precision k(x)."""
     log_evidence: Float[np.ndarray, "*of"]
     """log p(readings, model), for each output."""
@@ -130,7 +129,7 @@ class Posterior:
         return replace(self, filtered=np.zeros_like(self.filtered))
 
     def without(
-        self, i: int, prior: Matrices, readings: Readings, log_prior: Float[np.ndarray, " m"]
+        self, i: int, prior: Matrix, readings: Readings, log_prior: Float[np.ndarray, " m"]
     ) -> Posterior:
         """Return the posterior without reading i.
 
@@ -152,7 +151,7 @@ class Posterior:
         evidence = log_prior[:, None] + _log_evidence(prior, *sites, readings)
         return Posterior(*sites, evidence, np.zeros_like(self.filtered))
 
-    def update(self, prior: Matrices, readings: Readings) -> Posterior:
+    def update(self, prior: Matrix, readings: Readings) -> Posterior:
         """Include the first reading that is not yet included, by assumed-density filtering.
 
         Args:
@@ -204,14 +203,14 @@ def infer(
         groups: Number of groups of m / groups consecutive models; each has its own best model.
     """
     (m, n, _), k = covariance.shape, readings.low.shape[-2]
-    readings, log_prior = readings.broadcast((m, k, n)), np.reshape(log_prior, (-1, 1))
-    log_prior = log_prior + np.zeros((m, k))
+    readings = readings.broadcast((m, k, n))
+    log_prior = np.reshape(log_prior, (-1, 1)) + np.zeros((m, k))
     filtered = previous or Posterior.without_readings(log_prior)
     for _ in range(filtered.tau.shape[-1], n):
         filtered = filtered.update(covariance[:, None], readings)
     grouped = filtered.log_evidence.reshape(groups, m // groups, k)
-    likely = grouped > grouped.max(axis=1, keepdims=True) + math.log(_NEGLIGIBLE)
-    likely = likely.reshape(m, k)
+    least = grouped.max(axis=1, keepdims=True) + math.log(_NEGLIGIBLE)
+    likely = (grouped > least).reshape(m, k)
     tau, nu, weights, precision = (
         np.array(of) for of in (filtered.tau, filtered.nu, filtered.weights, filtered.precision)
     )
@@ -258,12 +257,7 @@ def _assign(target: Posterior, index: Bool[np.ndarray, "m k"], values: Posterior
 
 
 def _log_evidence(
-    prior: Matrices,
-    tau: Vectors,
-    nu: Vectors,
-    weights: Vectors,
-    precision: Matrices,
-    readings: Readings,
+    prior: Matrix, tau: Vector, nu: Vector, weights: Vector, precision: Matrix, readings: Readings
 ) -> Float[np.ndarray, "*of"]:
     """Log evidence of the readings as these sites approximate it."""
     mean, variance = _marginals(tau, nu, weights, precision)
@@ -288,7 +282,7 @@ def _greatest_evidence(readings: Readings) -> Float[np.ndarray, "*of"]:
     return np.asarray(np.log(likelihood).sum(axis=-1))
 
 
-def _cavity(mean: Vectors, variance: Vectors, tau: Vectors, nu: Vectors) -> tuple[Vectors, Vectors]:
+def _cavity(mean: Vector, variance: Vector, tau: Vector, nu: Vector) -> tuple[Vector, Vector]:
     """Mean and precision of each latent's cavity distribution.
 
     Oscillating updates may leave no precision; the mean is then that of the posterior.
@@ -300,15 +294,15 @@ def _cavity(mean: Vectors, variance: Vectors, tau: Vectors, nu: Vectors) -> tupl
 
 
 def _site(
-    mean: Vectors, precision: Vectors, tilted_mean: Vectors, tilted_variance: Vectors
-) -> tuple[Vectors, Vectors]:
+    mean: Vector, precision: Vector, tilted_mean: Vector, tilted_variance: Vector
+) -> tuple[Vector, Vector]:
     """Return tau and nu of the site that gives a cavity the moments of the tilted distribution."""
     tau = np.clip(1.0 / tilted_variance - precision, _LEAST_PRECISION, 1e10)
     tilted_mean = np.where(tau > _LEAST_PRECISION, tilted_mean, mean)
     return tau, (precision + tau) * tilted_mean - precision * mean
 
 
-def _whitened(prior: Matrices, tau: Vectors) -> Matrices:
+def _whitened(prior: Matrix, tau: Vector) -> Matrix:
     """I + tau^1/2 K tau^1/2, which is never ill-conditioned."""
     root = np.sqrt(tau)
     b = root[..., :, None] * prior * root[..., None, :]
@@ -317,7 +311,7 @@ def _whitened(prior: Matrices, tau: Vectors) -> Matrices:
     return np.asarray(b)
 
 
-def _precision(prior: Matrices, tau: Vectors) -> Matrices:
+def _precision(prior: Matrix, tau: Vector) -> Matrix:
     """(K + diag(1 / tau))^-1."""
     root = np.sqrt(tau)
     inverse = np.linalg.inv(_whitened(prior, tau))
@@ -325,8 +319,8 @@ def _precision(prior: Matrices, tau: Vectors) -> Matrices:
 
 
 def _marginals(
-    tau: Vectors, nu: Vectors, weights: Vectors, precision: Matrices
-) -> tuple[Vectors, Vectors]:
+    tau: Vector, nu: Vector, weights: Vector, precision: Matrix
+) -> tuple[Vector, Vector]:
     """Posterior mean and variance of every latent, without a product of matrices.
 
     K - K P K = 1 / tau - (1 / tau) P (1 / tau), P being `precision`.
@@ -335,9 +329,7 @@ def _marginals(
     return (nu - weights) / tau, np.maximum((1.0 - diagonal / tau) / tau, 1e-12)
 
 
-def tilted(
-    mean: Vectors, variance: Vectors, readings: Readings
-) -> tuple[Vectors, Vectors, Vectors]:
+def tilted(mean: Vector, variance: Vector, readings: Readings) -> tuple[Vector, Vector, Vector]:
     """Return log normaliser, mean and variance of N(mean, variance) times each likelihood."""
     from scipy.special import ndtr  # its import is a third of the start of a small command
 

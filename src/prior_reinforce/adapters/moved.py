@@ -87,6 +87,10 @@ class Hypothesis:
     jacobian: Float[np.ndarray, "n k k"]
     """dr/dz there, r in `UNIT`."""
 
+    def extend(self, log_p: float, *changes: Change) -> Hypothesis:
+        """Return it with further changes, of that log probability."""
+        return replace(self, changes=(*self.changes, *changes), log_prior=self.log_prior + log_p)
+
     def common_changes(self, a: Inputs, b: Inputs, *, shifts: bool) -> Float[np.ndarray, "p n"]:
         """Return the number of shifts, or of other changes, that affect both of two inputs."""
         common = np.zeros((len(a.numbers), len(b.numbers)))
@@ -155,12 +159,10 @@ class MovedPosterior:
         """Take up what `state` returned."""
         self._goal_starts = tuple(state.facts["begun"])
         self.memory, self._posterior = state.build(Memory), state.build(Posterior)
-        linearised = zip(state.arrays["at"], state.arrays["jacobian"], strict=True)
+        each = state.facts["hypotheses"], state.arrays["at"], state.arrays["jacobian"]
         self.hypotheses = [
             Hypothesis(model, changes_from_data(changes), log_prior, z, jacobian)
-            for (model, changes, log_prior), (z, jacobian) in zip(
-                state.facts["hypotheses"], linearised, strict=True
-            )
+            for (model, changes, log_prior), z, jacobian in zip(*each, strict=True)
         ]
 
     @property
@@ -174,13 +176,8 @@ class MovedPosterior:
 
     def announce_change(self, number: int) -> None:
         """Branch all hypotheses: a change before that trial or, less probably, none."""
-        self._branch(
-            [
-                (h, changes, log_p)
-                for changes, log_p in announced_changes(number, 1.0)
-                for h in range(len(self.hypotheses))
-            ]
-        )
+        announced, every = announced_changes(number, 1.0), range(len(self.hypotheses))
+        self._branch([(h, changes, log_p) for changes, log_p in announced for h in every])
 
     def observe(self, new: Memory) -> None:
         """Take in one more trial.
@@ -218,14 +215,7 @@ class MovedPosterior:
         posterior = self._posterior.select([h for h, _, _ in branches])
         log_p = np.array([log_p for _, _, log_p in branches])[:, None]
         self._posterior = replace(posterior, log_evidence=posterior.log_evidence + log_p)
-        self.hypotheses = [
-            replace(
-                self.hypotheses[h],
-                changes=(*self.hypotheses[h].changes, *changes),
-                log_prior=self.hypotheses[h].log_prior + log_p,
-            )
-            for h, changes, log_p in branches
-        ]
+        self.hypotheses = [self.hypotheses[h].extend(log_p, *more) for h, more, log_p in branches]
 
     def _linearise(self, h: int, new: Memory) -> Hypothesis:
         """Add the point of linearisation of a trial: the outcome that was read, less its shift."""
@@ -276,66 +266,55 @@ class MovedPosterior:
             cross = np.einsum("ncj,nj->jnc", jacobian[..., inexact], w[:, inexact] * gain_sd**2)
             covariance[i, :s, s:] = cross.reshape(s, n * self.k)
             covariance[i, s:, :s] = covariance[i, :s, s:].T
-            of_z = covariances[m] + self._hardware_covariance(hypothesis, memory, memory)
+            of_z = covariances[m] + self._hardware_covariance(i, memory, memory)
             of_r = np.einsum("ncj,jnm,mdj->ncmd", jacobian, of_z, jacobian)
-            of_r += self._shift_covariance(hypothesis, memory, memory) / (
-                unit[:, None, None] * unit
-            )
+            of_r += self._shift_covariance(i, memory, memory) / (unit[:, None, None] * unit)
             covariance[i, s:, s:] = of_r.reshape(n * self.k, n * self.k)
         variance = np.concatenate([np.full(s, _GAIN_VARIANCE), (memory.variance / unit**2).ravel()])
         readings = Readings(low, high, np.broadcast_to(variance, low.shape), _OUTLIER)
         log_prior = np.array([h.log_prior for h in self.hypotheses])
         return infer(covariance, readings, log_prior, previous and previous.as_start())
 
-    def _hardware_covariance(
-        self, hypothesis: Hypothesis, a: Inputs, b: Inputs
-    ) -> Float[np.ndarray, "k p n"]:
+    def _hardware_covariance(self, h: int, a: Inputs, b: Inputs) -> Float[np.ndarray, "k p n"]:
         """Covariance that changed hardware adds to z."""
+        common = self.hypotheses[h].common_changes(a, b, shifts=False)
         variance = np.square(_HARDWARE_FACTOR * self.symmetry.offset_sd)
-        return np.asarray(variance[:, None, None] * hypothesis.common_changes(a, b, shifts=False))
+        return np.asarray(variance[:, None, None] * common)
 
-    def _shift_covariance(
-        self, hypothesis: Hypothesis, a: Inputs, b: Inputs
-    ) -> Float[np.ndarray, "p k n k"]:
+    def _shift_covariance(self, h: int, a: Inputs, b: Inputs) -> Float[np.ndarray, "p k n k"]:
         """Covariance that shifts add to outcomes."""
-        common = hypothesis.common_changes(a, b, shifts=True)
+        common = self.hypotheses[h].common_changes(a, b, shifts=True)
         variance = np.square(_SHIFT * self.prior.scale)
         return np.asarray(common[:, None, :, None] * np.diag(variance)[None, :, None])
 
     def _prior_covariance(self, h: int, a: Inputs, b: Inputs) -> Float[np.ndarray, "k p n"]:
         """Prior covariance of z under a hypothesis."""
         of_model = self.prior.covariance(self.model(h), a.conditions, b.conditions)
-        return of_model + self._hardware_covariance(self.hypotheses[h], a, b)
+        return of_model + self._hardware_covariance(h, a, b)
 
     def predict(self, h: int, inputs: Inputs) -> Outcomes:
         """Predict the outcomes of plans under a hypothesis; the conditions of inputs are aims."""
-        prior, memory, hypothesis = self.prior, self.memory, self.hypotheses[h]
-        model, inexact, aims, p = (
-            self.model(h),
-            prior.inexact,
-            inputs.conditions,
-            len(inputs.numbers),
-        )
+        prior, memory, chart = self.prior, self.memory, self.symmetry.chart
+        model, inexact, aims, p = self.model(h), prior.inexact, inputs.conditions, len(inputs.goals)
         shape = (p, self.k, len(memory.numbers) * self.k)
         gain = np.zeros((p, self.k, len(inexact)))
-        shifts = (self._shift_covariance(hypothesis, inputs, memory) / self._unit).reshape(shape)
+        shifts = (self._shift_covariance(h, inputs, memory) / self._unit).reshape(shape)
         shifts = np.concatenate([gain, shifts], axis=2)
-        of_z = self._prior_covariance(h, inputs, memory)
-        cross = np.einsum("jpn,ncj->pjnc", of_z, hypothesis.jacobian).reshape(shape)
+        of_z, jacobian = self._prior_covariance(h, inputs, memory), self.hypotheses[h].jacobian
+        cross = np.einsum("jpn,ncj->pjnc", of_z, jacobian).reshape(shape)
         of_gain = prior.moves(aims)[:, inexact] * np.diag(model.gain_sd)[inexact] ** 2
         gain[:, inexact, np.arange(len(inexact))] = of_gain
         cross = np.concatenate([gain, cross], axis=2)
         weights = self._posterior.weights[h, 0]
         z = prior.mean(model, aims) + cross @ weights
-        jacobian = self.symmetry.chart.jacobian(z)
-        mean = self.symmetry.chart.back(z) + shifts @ weights
+        jacobian, mean = chart.jacobian(z), chart.back(z) + shifts @ weights
         return Outcomes(inputs, z, mean, jacobian, jacobian @ cross + shifts)
 
     def covariance(self, h: int, a: Outcomes, b: Outcomes) -> Float[np.ndarray, "p k n k"]:
         """Return the posterior covariance of outcomes, without the noise of an execution."""
         of_z = self._prior_covariance(h, a.inputs, b.inputs)
         of_r = np.einsum("pcj,jpn,ndj->pcnd", a.jacobian, of_z, b.jacobian)
-        of_r += self._shift_covariance(self.hypotheses[h], a.inputs, b.inputs)
+        of_r += self._shift_covariance(h, a.inputs, b.inputs)
         precision = self._posterior.precision[h, 0]
         return np.asarray(of_r - np.einsum("pcq,qr,ndr->pcnd", a.cross, precision, b.cross))
 

@@ -34,9 +34,9 @@ from prior_reinforce.adapters.memory import Memory
 _TRIALS_AFTER_A_MISS = 1.24
 """Fitted to 1623 trials of tuning material (ours; reproduction/docs/decisions-adapter.md)."""
 _LEAST_P_HIT = 0.01
-"""Least P(hit) for which a number of trials is expected (ours). If trials were reported as "a miss"
-and nothing else, 1 / P(hit) are expected: such a trial teaches little. That is still too few: 8 to
-13 where 14 were needed (tuning fields)."""
+"""Least P(hit) for which a number of trials is expected (ours). If "a miss" was all that was told,
+1 / P(hit) are expected: such a trial teaches little. That is still too few: 8 to 13 where 14 were
+needed (tuning fields)."""
 _CELLS = 64
 """Most cells of a ball along each component but the last (ours)."""
 _ALL_CELLS = 32768
@@ -49,8 +49,7 @@ sets, twenty seeds)."""
 _EVALUATED = 200_000
 """Samples times candidates, between those two (ours)."""
 _FEWEST = 64
-"""Fewest samples of an improbable hypothesis, which may be the one that explains the misses
-(ours)."""
+"""Fewest samples of an improbable hypothesis, which may explain the misses (ours)."""
 _EDGE = 0.1
 """Blur of a ball's edge, in radii (ours): small differences show in few samples."""
 _SINGULAR = 1e-9
@@ -120,16 +119,14 @@ def p_hit_given_misses(
         for j in range(k):
             models = _sample_models(prediction.model_weights[:, j], n_samples, seed + j)
             for m in np.unique(models):
-                of_model, z = models == m, normal[j, models == m]
+                own, z = models == m, normal[j, models == m]
                 # Equal conditions have a singular covariance: its root is found by eigenvectors.
                 values, vectors = np.linalg.eigh(prediction.missed_covariance[m, j])
                 root = np.sqrt(np.maximum(values, _SINGULAR * values[-1]))
                 gain = (prediction.cross[m, j] @ (vectors / root)).T
                 left = np.maximum(prediction.variance[m, j] - np.square(gain).sum(axis=0), 0.0)
-                at_missed[j, of_model] = (
-                    prediction.missed_mean[m, j] + z[:, :-1] @ (vectors * root).T
-                )
-                at_candidates[j, of_model] = (
+                at_missed[j, own] = prediction.missed_mean[m, j] + z[:, :-1] @ (vectors * root).T
+                at_candidates[j, own] = (
                     prediction.mean[m, j] + z[:, :-1] @ gain + z[:, -1:] * np.sqrt(left)
                 )
         hit, weight = weighted_hits(at_missed, missed, at_candidates, candidates, outlier)
