@@ -8,33 +8,29 @@ in one line.
 from __future__ import annotations
 
 import ctypes
+import multiprocessing
 import os
 import random
 import re
 import resource
+import select
 import shutil
-import subprocess
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 
-from prior_reinforce.arm.executing.lock import is_executing
+from prior_reinforce.arm.executing.lock import ARM_VARIABLE, is_executing
 from prior_reinforce.arm.workspace.execute import recover
 from prior_reinforce.arm.workspace.workspace import Workspace
+from prior_reinforce.cli import main
 from prior_reinforce.session.events import Entry
 from tests.arm.workspace.planar import recordings
 from tests.attacks.harness import HELD, tree
 
-PROGRAM = """
-import sys
-from prior_reinforce.cli import main
-# What takes time is not it:
-import prior_reinforce.arm.workspace.workspace, prior_reinforce.session.session
-print("ready", flush=True)
-sys.stdin.readline()
-sys.exit(main(sys.argv[1:]))
-"""
+_FORK = multiprocessing.get_context("fork")
+"""None of the commands uses torch, whose threads do not survive a fork."""
+
 COMMANDS: dict[str, tuple[str, ...]] = {
     "new": ("new", "other"),
     "import": ("import", "planar", "recorded"),
@@ -58,7 +54,7 @@ HOW = ("killed", "refused")
 """How a command is interrupted; refused by a disk that is full, or by one that is read-only."""
 LONGEST_S = 300.0
 """For a command; ours: a dozen at once on a busy computer."""
-_PR_CAPBSET_DROP, _CAP_DAC_OVERRIDE = 24, 1
+_CAPABILITIES, _PR_CAPBSET_DROP, _CAP_DAC_OVERRIDE = 0x20080522, 24, 1
 """Root's right to write where permissions forbid it; it stays root, and reads what is its own."""
 
 
@@ -72,10 +68,9 @@ def attack(how: str, name: str, rng: random.Random, here: Path, asked: Path) -> 
             workspace.session().tell(1, [0.05, 0.0])
         before = list(workspace.events)
     if how == "killed":
-        program = _start(here, *COMMANDS[name])
+        program = _Called(here, *COMMANDS[name])
         time.sleep(rng.uniform(0, 1) ** 2 * 0.4)
-        program.kill()
-        program.communicate()
+        program.end(kill=True)
         time.sleep(0.05)
     else:
         disk = rng.choice(["full", "read-only"])
@@ -94,45 +89,66 @@ def _refuse(disk: str, name: str, here: Path, limit: int) -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
     def read_only() -> None:
-        ctypes.CDLL(None).prctl(_PR_CAPBSET_DROP, _CAP_DAC_OVERRIDE)  # fails where we are not root
         for path, mode in kept.items():
             path.chmod(mode & 0o555)
+        # Of root, in this process and in what it starts; fails where we are not root.
+        libc, of_all = ctypes.CDLL(None), (ctypes.c_uint32 * 6)()
+        header = (ctypes.c_uint32 * 2)(_CAPABILITIES, 0)
+        libc.capget(header, of_all)
+        of_all[0] &= ~(1 << _CAP_DAC_OVERRIDE)
+        libc.capset(header, of_all)
+        libc.prctl(_PR_CAPBSET_DROP, _CAP_DAC_OVERRIDE)
 
-    program = _start(here, *COMMANDS[name], first=full if disk == "full" else read_only)
-    _, err = program.communicate(timeout=LONGEST_S)
+    refusing = full if disk == "full" else read_only
+    status, err = _Called(here, *COMMANDS[name], first=refusing).end()
     for path, mode in kept.items():
         path.chmod(mode)
     says = "free some disk space|cannot write"
     if disk == "read-only":
         says = "make the folder writable"
-        assert program.returncode == 2, err
+        assert status == 2, err
         assert tree(here) == before, "changed by a refusal"
-    if program.returncode:
-        assert (program.returncode, err.count("\n")) == (2, 1), err
+    if status:
+        assert (status, err.count("\n")) == (2, 1), err
         assert re.search(says, err), err
 
 
-def _start(
-    here: Path, *args: str, first: Callable[[], None] | None = None
-) -> subprocess.Popen[str]:
-    program = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, *args],
-        cwd=here,
-        # Or a disk that is full would leave half of a module's bytecode, and every later program
-        # that imports it would fail.
-        env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=first,
-    )
-    assert program.stdout is not None
-    assert program.stdin is not None
-    program.stdout.readline()
-    program.stdin.write("go\n")
-    program.stdin.flush()
-    return program
+class _Called:
+    """A command in a fork of this process, which has loaded what takes time and is not it."""
+
+    def __init__(self, here: Path, *args: str, first: Callable[[], object] = str) -> None:
+        self._said, said = os.pipe()
+        self._process = _FORK.Process(target=_call, args=(here, args, first, said))
+        self._process.start()
+        os.close(said)
+
+    def end(self, *, kill: bool = False) -> tuple[int | None, str]:
+        """Wait for it, killed or not: its exit status, and what it complained of."""
+        if kill:
+            self._process.kill()
+        err = b""
+        while select.select([self._said], [], [], LONGEST_S)[0]:
+            if not (more := os.read(self._said, 4096)):
+                break
+            err += more
+        else:
+            self._process.kill()
+        os.close(self._said)
+        self._process.join()
+        return self._process.exitcode, err.decode()
+
+
+def _call(here: Path, args: tuple[str, ...], first: Callable[[], object], said: int) -> None:
+    # Bytecode that a full disk cuts off would make every later program fail that imports it.
+    sys.dont_write_bytecode = True
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    os.dup2(said, 2)
+    os.close(said)
+    sys.stdout, sys.stderr = open(1, "w"), open(2, "w")  # noqa: SIM115
+    os.environ[ARM_VARIABLE] = str(here)  # other attacks run at the same time
+    os.chdir(here)
+    first()
+    sys.exit(main([*args]))
 
 
 def _check(folder: Path, before: list[Entry], here: Path) -> list[Entry]:
@@ -168,14 +184,13 @@ def _finish(name: str, here: Path, folder: Path) -> None:
         moved = motions.read_text().count("moved") if motions.exists() else 0
         assert moved <= kinds.count("moving"), "a motion is not recorded"
         if recovered is not None or moved:
-            _start(here, *COMMANDS[name]).communicate(timeout=LONGEST_S)
+            _Called(here, *COMMANDS[name]).end()
             assert motions.read_text().count("moved") == 1, "a plan moved twice"
         return
-    again = _start(here, *COMMANDS[name])
-    _, err = again.communicate(timeout=LONGEST_S)
+    status, err = _Called(here, *COMMANDS[name]).end()
     assert "Traceback" not in err, err
     # Either it does what was not done, or it says that it was done already.
-    assert again.returncode in (0, 2), err
+    assert status in (0, 2), err
     with Workspace(folder) as workspace:
         kinds = [event.kind for event in workspace.events]
     expected = {"tell": "told", "amend": "amended", "void": "voided"}.get(name)
