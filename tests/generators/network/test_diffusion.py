@@ -18,7 +18,7 @@ SMALL = DiffusionConfig(
         widths=(32, 64), step_width=32, condition_width=32, activation="silu"
     ),
     prediction="sample",
-    training_steps=300,
+    training_steps=200,
     batch_size=12,
     learning_rate=4e-3,
     warmup_steps=20,
