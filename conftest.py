@@ -167,6 +167,17 @@ def toy_plugin(monkeypatch):
 
 
 @pytest.fixture(scope="session")
+def lerobot(tmp_path_factory):
+    """A Python with LeRobot."""
+    from tests.arm.executing.lerobot_nursery import NO_LEROBOT, nursery
+
+    if NO_LEROBOT:
+        pytest.skip("no LeRobot; install it with: make lerobot")
+    with nursery(tmp_path_factory.mktemp("lerobot")) as python:
+        yield python
+
+
+@pytest.fixture(scope="session")
 def certificate(tmp_path_factory):
     """A certificate of 127.0.0.1 by nobody, and its key."""
     folder = tmp_path_factory.mktemp("certificate")

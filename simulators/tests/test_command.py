@@ -12,7 +12,6 @@ import pytest
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.simulation.tasks import make_task
 from simulators.__main__ import main
-from tests.arm.executing.test_lerobot import LEROBOT, NO_LEROBOT
 
 
 @pytest.fixture
@@ -81,10 +80,8 @@ def lines_of(served, wanted):
 
 
 @pytest.mark.slow
-def test_an_so101_goes_from_six_recorded_throws_to_a_hit(run, tmp_path, monkeypatch):
+def test_an_so101_goes_from_six_recorded_throws_to_a_hit(run, lerobot, tmp_path, monkeypatch):
     """The sequence of docs/lerobot.md, through LeRobot's own class."""
-    if NO_LEROBOT:
-        pytest.skip("no LeRobot; install it with: make lerobot")
     monkeypatch.chdir(tmp_path)
     command = [sys.executable, "-m", "simulators", "so101"]
     flags = ["--hand", "--lock-step", "--goal", "0.46", "0.08"]
@@ -93,7 +90,7 @@ def test_an_so101_goes_from_six_recorded_throws_to_a_hit(run, tmp_path, monkeypa
         *section, _ = lines_of(served, "is served")
         assert run("new", "hoop", "--robot", "so101", "--dt", "0.02", "--tolerance", "0.02")[0] == 0
         with Path("hoop/workspace.toml").open("a") as manifest:
-            manifest.write("".join(["\n", *section, f'python = "{LEROBOT}"\n']))
+            manifest.write("".join(["\n", *section, f'python = "{lerobot}"\n']))
         record = ("record", "hoop", "--takes", "6", "--seconds", "1.7", "--pause", "3.8", "--yes")
         _, _, err = run(*record)
         assert "no outcomes for episodes take-1, take-2, take-3, take-4, take-5, take-6," in err

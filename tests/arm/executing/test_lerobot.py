@@ -21,10 +21,6 @@ from prior_reinforce.simulation.tasks.so101 import LAG, SO101Shot
 from simulators.feetech import GOAL_POSITION, PRESENT_POSITION, TORQUE_ENABLE
 from simulators.so101 import Port, SimulatedSO101
 
-REPOSITORY = Path(__file__).parents[3]
-LEROBOT = REPOSITORY / ".venv/lerobot/python"
-NO_LEROBOT = not LEROBOT.exists() and "PRIOR_REINFORCE_REQUIRED" not in os.environ
-"""Whether tests that need it are skipped: never in CI."""
 COLUMNS = PlanFormat(("joint1.pos", "gripper.pos"), ("rad", "percent"), 0.02)
 
 
@@ -215,6 +211,7 @@ def serve(tmp_path):
 
     def start(landed=lambda rollout: None, **more):
         arm = SimulatedSO101(landed=landed)
+        arm.advance(0.01)  # the first time takes longer than LeRobot waits for an answer
         port = Port(arm, tmp_path / "arm", lock_step=0.01, **more)
         thread = threading.Thread(target=port.serve)
         thread.start()
@@ -227,17 +224,15 @@ def serve(tmp_path):
         thread.join(10)
 
 
-def so101(folder, **settings):
+def so101(lerobot, folder, **settings):
     """LeRobot's own class, in the Python that `make lerobot` makes."""
-    if NO_LEROBOT:
-        pytest.skip("no LeRobot; install it with: make lerobot")
     robot = {
         "type": "so101_follower",
         "port": str(folder / "arm/port"),
         "id": "simulated",
         "calibration_dir": str(folder / "arm/calibration"),
     }
-    config = LeRobotConfig(robot=robot, python=str(LEROBOT), lag=LAG, clock="cycles", **settings)
+    config = LeRobotConfig(robot=robot, python=str(lerobot), lag=LAG, clock="cycles", **settings)
     return LeRobotArm(config)
 
 
@@ -259,13 +254,13 @@ def _steps(arm):
 
 
 @pytest.mark.slow
-def test_lerobots_own_so101_class_throws_as_the_task_does(serve, tmp_path):
+def test_lerobots_own_so101_class_throws_as_the_task_does(serve, lerobot, tmp_path):
     landed, task = [], SO101Shot()
     simulated = serve(landed.append)
     frames = task.demonstrations("A").plans[4]
     for servo in simulated.servos.values():  # goals of long ago
         servo.write_word(GOAL_POSITION, servo.word(PRESENT_POSITION) + 200)
-    before, arm = _steps(simulated), so101(tmp_path)
+    before, arm = _steps(simulated), so101(lerobot, tmp_path)
     try:
         for _ in range(50):  # half a second of the arm's time
             arm.where()
@@ -289,9 +284,9 @@ def test_lerobots_own_so101_class_throws_as_the_task_does(serve, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_bus_that_dies_in_mid_swing_is_a_fault(serve, tmp_path):
+def test_a_bus_that_dies_in_mid_swing_is_a_fault(serve, lerobot, tmp_path):
     serve(dies_after=100)
-    arm = so101(tmp_path)
+    arm = so101(lerobot, tmp_path)
     try:
         path = arm.run(line_to(arm, np.array([0.0, -0.5, -0.5, -0.5, 0.0])))
     finally:

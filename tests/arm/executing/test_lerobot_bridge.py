@@ -66,14 +66,14 @@ def test_positions_that_are_lost_again_and_again_are_an_error():
 
 
 @pytest.mark.slow
-def test_a_port_that_is_not_there_is_named(tmp_path):
+def test_a_port_that_is_not_there_is_named(lerobot, tmp_path):
     with pytest.raises(ConfigurationError, match="Could not connect on port"):
-        so101(tmp_path)
+        so101(lerobot, tmp_path)
 
 
 @pytest.mark.slow
-def test_an_arm_that_is_calibrated_otherwise_than_its_file_says_is_refused(serve, tmp_path):  # noqa: F811
+def test_an_arm_that_is_calibrated_otherwise_than_its_file_is_refused(serve, lerobot, tmp_path):  # noqa: F811
     arm = serve()
     arm.servos[2].write_word(9, 700)
     with pytest.raises(ConfigurationError, match="is not calibrated, or not as its file says"):
-        so101(tmp_path)
+        so101(lerobot, tmp_path)
