@@ -103,6 +103,11 @@ _NO_POSITION = re.compile(
 )
 """Words of rates, torques, increments and whatever else is no joint position, in `_words`. Ours,
 and broad on purpose: a column that is not taken for a joint's is named, and can be renamed."""
+_NO_CHANNEL = re.compile(
+    r"\b(offset|bias|latency|jitter|(control|sampl\w*|command|update|loop|frame|refresh|recording"
+    r"|success) (\w+ )*(rate|freq(uency)?|hz|fps)|fps)\b"
+)
+"""Words of what is no part of a motion at all, in `_words`: `q_offset`, `control_rate`."""
 _DERIVED = re.compile(r"(^|[/.:])(d(?!\W?_?\d)|dd+|v|dv|dt)($|[^a-z])", re.IGNORECASE)
 """What a derivative is called before a joint: `d_joint1`; `q_d` is desired, `d3` slides."""
 _BY_NAME = (
@@ -245,6 +250,11 @@ def says_no_position(name: str) -> bool:
     return bool(_NO_POSITION.search(called) or _DERIVED.search(name)) or is_increment(name)
 
 
+def says_no_channel(name: str) -> bool:
+    """Whether a name says that it is no channel of any plan: an offset, the rate of a control."""
+    return re.search(_NO_CHANNEL, _words(name)) is not None
+
+
 def zero_at_rest(names: Sequence[str], units: Sequence[str | None]) -> list[int]:
     """Return the columns that are 0 at rest: increments, and speeds by their unit or their name.
 
@@ -324,6 +334,15 @@ def _are_matrix(_: str, parts: set[str]) -> bool:
 def is_opening(name: str) -> bool:
     """Whether a name is of how far a gripper is open: `gripper`, `robot0_gripper_qpos`."""
     return re.search(_OPENING, _words(name)) is not None
+
+
+def commanded(names: Sequence[str]) -> list[str]:
+    """Return commands whose measured counterparts are there: `target_elbow` beside `elbow`."""
+    bare = {name: re.sub(_MEASURED, "", _words(name)).split() for name in names}
+    of = {name: re.sub(_COMMANDED, "", _words(name)).split() for name in names}
+    orders = [name for name in names if re.search(_COMMANDED, _words(name))]
+    measured = [bare[name] for name in names if name not in orders]
+    return [name for name in orders if of[name] in measured]
 
 
 def measured_of(stems: Sequence[str]) -> str | None:

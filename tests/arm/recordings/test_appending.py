@@ -152,3 +152,23 @@ def test_a_base_that_was_turned_and_stands_still_is_in_no_other_unit():
     names = ("pan", "elbow")
     before = demonstrations(names, "rad", lambda i: thrown(i, 0.02))
     assert joined(before, selection(names, "rad", lambda i: thrown(i, 1.2)))[0].n == 2 * N
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.004])
+def test_a_throw_that_is_there_smoothed_or_cut_elsewhere_is_not_appended(noise):
+    def motion(i, shift=0.0):
+        s = np.interp(T + shift, T, S)
+        return np.outer(s, [0.5 + 0.1 * i, -1.0, 0.3])
+
+    names, rng = ("pan", "lift", "elbow"), np.random.default_rng(0)
+    before = demonstrations(names, "rad", motion)
+    again = demonstrations(
+        names, "rad", lambda i: motion(i, 2 / 60) + noise * rng.normal(size=(len(T), 3)), first=1
+    )
+    with pytest.raises(InvalidDemonstrationsError, match=r"^a, b landed .*--leave-out a b;"):
+        appended(before, again, ["a", "b", "c"])
+    others = demonstrations(names, "rad", motion, first=N)
+    assert appended(before, others, ["a", "b", "c"]).n == 2 * N
+    other = demonstrations(names, "rad", lambda i: motion(i) * [1, 1, -1])
+    with pytest.warns(UserWarning, match="have the same outcome"):  # by another motion
+        assert appended(before, other, ["a", "b", "c"]).n == 2 * N

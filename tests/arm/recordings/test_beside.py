@@ -159,3 +159,12 @@ def test_a_base_of_many_numbers_hides_no_gripper():
     recording = Recording("a", T, Q, UR, beside=arrays_beside(Q, others, T))
     assert [*moving_beside([recording])][:2] == ["grip", "base_T[0]"]
     assert select([recording]).left_out.startswith("grip, 0 to 1; base_T[0], 1 to 2; base_T[1], 0")
+
+
+def test_commands_of_single_names_are_asked_about_beside_what_was_measured():
+    columns = ["shoulder", "elbow", "grip", "target_elbow", "shoulder_cmd", "goal_x"]
+    values = np.column_stack([Q, Q[:, :2] + 0.1, S])
+    (asked,) = twin_vectors(columns, values)
+    assert asked.option == "--joints shoulder elbow grip goal_x"
+    assert not asked.guessed
+    assert [*twin_vectors(["cmd_elbow", "cmd_pan", "wrist"], Q)] == []

@@ -1,9 +1,12 @@
 """Times come from the file, its rate or a given rate; a guess about them is a doubt."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from prior_reinforce.arm.recordings.clock import (
+    clock_among,
     clock_of,
     declared_rate,
 )
@@ -301,3 +304,19 @@ def test_two_rates_that_contradict_each_other_are_refused():
 def test_whole_numbers_called_t_count_frames_where_milliseconds_are_no_throw(count, option):
     clock = clock_of("0", count, stamps=np.arange(count), name="t")
     assert [one.option for one in clock.ambiguities] == [f"--time-unit {option}"]
+
+
+def test_a_given_rate_beside_a_period_in_an_unknown_unit_is_held_against_it():
+    told = clock_of("a", 3, name="dt", own_rate=1 / 20, rate=100.0)
+    assert all(rate in told.source for rate in ("50", "20"))
+    assert told.period == pytest.approx(0.01)
+    for rate in (50.0, 20.0):
+        assert clock_of("a", 3, name="dt", own_rate=1 / 20, rate=rate).source == "the given rate"
+
+
+def test_the_rate_of_each_frame_is_none_of_the_file():
+    rates = {"control_rate": np.array([999.0, 1000, 1001]), "t": np.arange(3) / 50}
+    options = ReadOptions()
+    assert clock_among(Path("a.npz"), "a", 3, rates, options, rates).period == pytest.approx(0.02)
+    same = {"fps": np.full(3, 50.0)}
+    assert clock_among(Path("a.npz"), "a", 3, same, options, same).period == pytest.approx(0.02)

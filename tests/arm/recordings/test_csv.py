@@ -661,3 +661,58 @@ def test_frames_that_a_column_calls_invalid_are_lost(tmp_path, flags):
     assert found.names == tuple(JOINTS)
     assert np.flatnonzero(np.isnan(found.positions).all(axis=1)).tolist() == [20, 21]
     assert any("valid" in remark for remark in found.remarks)
+
+
+@pytest.mark.parametrize("by", ["column", "comment", "json"])
+def test_a_recording_that_is_flagged_as_failed_is_said(tmp_path, by):
+    t, q = sampled(0, 50)
+    for i, failed in enumerate((False, True)):
+        frames = pd.DataFrame(np.column_stack([t, q]), columns=["t", *JOINTS])
+        frames = frames.assign(success=not failed) if by == "column" else frames
+        head = f"# success: {not failed}\n" if by == "comment" else ""
+        (tmp_path / f"{i}.csv").write_text(head + frames.to_csv(index=False))
+        if by == "json":
+            (tmp_path / f"{i}.json").write_text(json.dumps({"outcome": {"success": not failed}}))
+    good, bad = read_recordings(tmp_path)
+    assert good.names == bad.names == JOINTS
+    told = [any("--leave-out" in r and "calls it" in r for r in one.remarks) for one in (good, bad)]
+    assert told == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("name", "said", "unit"),
+    [
+        ("intrinsics", {"angle_unit": "deg"}, None),
+        ("camera_info", {"rotation": {"units": "deg"}}, None),
+        ("config", {"units": "deg", "labels": ["a", "b"]}, None),
+        ("config", {"units": "deg", "names": ["j1", "j2"]}, "deg"),
+        ("config", {"units": {"j1": "deg", "j2": "deg"}}, "deg"),
+        ("recording_info", {"units": "deg"}, "deg"),
+    ],
+)
+def test_a_json_alone_counts_where_it_is_of_the_recordings(tmp_path, name, said, unit):
+    rows = "".join(f"{k / 50},{k / 9},{k / 8}\n" for k in range(5))
+    (tmp_path / "throw_0.csv").write_text(f"t,j1,j2\n{rows}")
+    (tmp_path / f"{name}.json").write_text(json.dumps(said))
+    (read,) = read_recordings(tmp_path)
+    assert read.units == (unit, unit)
+
+
+def test_a_json_of_something_else_names_no_columns(tmp_path):
+    np.savetxt(tmp_path / "throw_0.csv", sampled(0, 100)[1], delimiter=",")
+    (tmp_path / "panel.json").write_text(json.dumps({"column_labels": list("abcdefg")}))
+    (read,) = read_recordings(tmp_path, rate=100)
+    assert not read.named
+
+
+def test_an_offset_and_the_rate_of_a_control_are_no_channels(tmp_path):
+    t, q = sampled(0, 50)
+    others = ["q_offset_1", "control_rate", "control_command_success_rate"]
+    table = np.column_stack([t, q, 0.1 * q[:, 1], 1000 + q[:, 1], 1 - 0.1 * q[:, 1] ** 2])
+    head = ",".join(["t", *JOINTS, *others])
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header=head, comments="")
+    (read,) = read_recordings(tmp_path)
+    assert read.names == JOINTS
+    assert any(all(name in remark for name in others) for remark in read.remarks)
+    (named,) = read_recordings(tmp_path, joints=("joint1", "control_rate"))
+    assert named.names == ("joint1", "control_rate")

@@ -380,3 +380,18 @@ def test_a_record_that_is_the_motion_is_held_to_the_largest_size(tmp_path):
         file.create_dataset("log", (30_000_000,), kind, chunks=(1000,))
     with pytest.raises(FileFormatError, match="no recording of throws"):
         read_recordings(tmp_path, key="position")
+
+
+@pytest.mark.parametrize("as_array", [True, False])
+def test_an_episode_that_is_flagged_as_failed_is_said(tmp_path, as_array):
+    with h5py.File(tmp_path / "demos.h5", "w") as file:
+        for i in range(2):
+            group = file.create_group(f"traj_{i}")
+            group["obs/agent/qpos"] = sampled(i, 20)[1]
+            if as_array:  # of the frames but the last, as ManiSkill has them
+                group["success"] = np.arange(len(sampled(i, 20)[1]) - 1) > 20 + 99 * i
+            else:
+                group.attrs["success"] = i == 0
+    good, bad = read_recordings(tmp_path / "demos.h5", rate=20)
+    assert not any("success" in remark for remark in good.remarks)
+    assert any("success" in remark and "--leave-out" in remark for remark in bad.remarks)

@@ -6,9 +6,16 @@ import numpy as np
 import pytest
 
 from prior_reinforce.arm.recordings import Preprocessing, import_demonstrations, inspect_recordings
-from prior_reinforce.arm.recordings.inspection import acceleration_of, say_small
+from prior_reinforce.arm.recordings.inspection import (
+    Wanted,
+    acceleration_of,
+    inspect,
+    say_small,
+)
+from prior_reinforce.arm.recordings.recording import Recording
+from prior_reinforce.arm.recordings.selection import select
 from prior_reinforce.arm.robots.presets import robot_limits
-from prior_reinforce.errors import InvalidDemonstrationsError
+from prior_reinforce.errors import InvalidDemonstrationsError, UnclearUnitsError
 from prior_reinforce.plans.interpolation import join_frames
 from tests.arm.recordings.recorded import (
     JOINTS,
@@ -297,3 +304,13 @@ def test_a_held_joint_is_known_by_its_whole_name(tmp_path):
     assert imported(folder, robot).n == N
     with pytest.raises(InvalidDemonstrationsError, match=r"Wrist_Pitch is recorded at 0\.5"):
         imported(written(folder, (0.5, 0.5), "Wrist_Pitch"), robot)
+
+
+def test_counts_that_leap_are_asked_about_before_they_are_refused():
+    robot, t = robot_limits("ur5e"), np.arange(100) * 0.01
+    names = robot.joint_names
+    q = np.round(30000 + np.outer(1 - np.cos(3 * t), np.linspace(1000, 5000, len(names))))
+    some = select([Recording("a", t, q, names)], names, names, plan_units=("rad",))
+    with pytest.raises(UnclearUnitsError, match="counts a turn") as asked:
+        inspect(some, Wanted(robot=robot))
+    assert asked.value.options == "--units UNIT"

@@ -1,7 +1,11 @@
 """Units are judged of each channel on its own, by its name and its numbers."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
+from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.selection import select
 from prior_reinforce.errors import ConfigurationError
 from tests.arm.recordings.recorded import takes
@@ -213,3 +217,40 @@ def test_a_joint_beside_others_in_no_known_unit_is_not_in_degrees(largest, optio
 def test_one_unit_of_a_plan_holds_for_all_joints():
     found = select(takes(SO101, (20, -53, 40, 70)), plan_units=("percent",), normalised=True)
     assert (found.units, found.ambiguities) == (("percent",) * 4, ())
+
+
+def test_joints_that_all_fill_a_range_were_normalised():
+    names = ("pan", "lift", "elbow")
+    t = np.linspace(-1, 1, 100)
+    some = [Recording("t0", t, np.outer(t, [1, -1, 0.5]), names)]
+    some += [Recording("t1", t, np.outer(t**3, [0.9, -0.8, 0.5]), names)]
+    (asked,) = select(some).ambiguities
+    assert (asked.option, asked.guessed) == ("--units UNIT UNIT rad", False)
+    assert "normalised" in asked.what
+    assert select(some, units=["rad"]).ambiguities == ()
+    one = [replace(r, positions=r.positions * [1, 0.9, 1.1]) for r in some]
+    assert select(one).ambiguities == ()
+
+
+def test_joints_of_a_mean_of_0_and_a_deviation_of_1_were_normalised():
+    t = np.arange(100) * 0.01
+    q = np.column_stack([t, t**2, np.sin(3 * t)])
+    q = (q - q.mean(axis=0)) / q.std(axis=0)
+    (asked,) = select([Recording("t", t, q, ("pan", "lift", "elbow"))]).ambiguities
+    assert asked.option == "--units UNIT"
+
+
+def test_an_opening_below_0_is_asked_about():
+    names, units = ("j1", "gripper"), ("rad", "percent")
+    some = takes(names, (1, 1), (1, -1))
+    (asked,) = select(some, names, names, plan_units=units).ambiguities
+    assert (asked.option, asked.guessed) == ("--units rad UNIT", False)
+    assert select(takes(names, (1, 90), (1, -3)), names, names, plan_units=units).ambiguities == ()
+
+
+@pytest.mark.parametrize(("most", "unit"), [(2961, "0.088 deg"), (47370, "0.0055 deg")])
+def test_counts_are_asked_about_with_what_one_is(most, unit):
+    names = ("pan", "lift", "elbow")
+    asked = select(takes(names, (most, 0.8 * most, 0.7 * most))).ambiguities
+    assert {one.option for one in asked} == {"--units UNIT"}
+    assert any(f"'{unit}' for" in one.what for one in asked)

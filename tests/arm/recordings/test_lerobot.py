@@ -175,3 +175,30 @@ def test_lerobot_whose_state_is_a_place_says_where_the_joints_are(tmp_path):
     (one,) = read_recordings(folder, joints=joints, key="observation.joint_position")
     np.testing.assert_allclose(one.positions, rows, atol=1e-6)
     assert read_recordings(folder)[0].names[:3] == ("x", "y", "z")
+
+
+@pytest.mark.parametrize("version", ["v3.0", "v2.1"])
+@pytest.mark.parametrize("of_frames", [True, False])
+def test_an_episode_that_is_flagged_as_failed_is_said(tmp_path, version, of_frames):
+    motions = [sampled(i, 50)[1] for i in range(2)]
+    folder = lerobot_set(tmp_path / "set", 50, motions, [*JOINTS], version)
+    meta = folder / "meta"
+    if of_frames:
+        info = json.loads((meta / "info.json").read_text())
+        info["features"]["next.success"] = {"dtype": "bool", "shape": [1], "names": None}
+        (meta / "info.json").write_text(json.dumps(info))
+        for path in folder.glob("data/**/*.parquet"):
+            table = parquet.read_table(path)
+            flags = [episode == 0 for episode in table["episode_index"].to_pylist()]
+            parquet.write_table(table.append_column("next.success", pa.array(flags)), path)
+    elif version == "v2.1":
+        rows = map(json.loads, (meta / "episodes.jsonl").read_text().splitlines())
+        text = [json.dumps(row | {"success": i == 0}) for i, row in enumerate(rows)]
+        (meta / "episodes.jsonl").write_text("\n".join(text))
+    else:
+        (path,) = meta.glob("episodes/**/*.parquet")
+        table = parquet.read_table(path).append_column("success", pa.array([True, False]))
+        parquet.write_table(table, path)
+    good, bad = read_recordings(folder)
+    said = [any("success" in remark for remark in one.remarks) for one in (good, bad)]
+    assert said == [False, True]

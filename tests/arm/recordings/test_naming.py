@@ -168,3 +168,10 @@ def test_a_channel_is_of_the_joint_whose_whole_name_it_has():
 def test_two_columns_of_one_name_are_not_chosen_from():
     with pytest.raises(InvalidDemonstrationsError, match="joint1; rename"):
         find_channels(["joint1", "joint2"], ["joint0", "joint1", "joint1", "joint2"])
+
+
+def test_of_what_was_measured_and_commanded_a_joint_is_what_was_measured():
+    there = ("target_joint1", "target_joint2", "actual_joint1", "actual_joint2")
+    assert find_channels(("joint1", "joint2"), there) == [2, 3]
+    with pytest.raises(InvalidDemonstrationsError, match="--joints"):
+        find_channels(("joint1",), ("left_joint1", "right_joint1"))

@@ -398,3 +398,15 @@ def test_dates_and_spans_are_times_whose_unit_nobody_is_asked_for(tmp_path, star
     stamps[5] = "NaT"
     with pytest.raises(InvalidDemonstrationsError, match=r"nan.* frame 5"):
         read_one(tmp_path, q=Q, timestamps=stamps)
+
+
+def test_an_episode_that_is_flagged_as_failed_is_said(tmp_path):
+    t = np.arange(0, 2, 0.02)
+    motions, flags = np.stack([throw(i, t) for i in range(N)]), np.arange(N) != 2
+    np.savez(tmp_path / "all.npz", t=t, q=motions, success=flags)
+    read = read_recordings(tmp_path / "all.npz")
+    said = [any("success" in remark for remark in one.remarks) for one in read]
+    assert said == (~flags).tolist()
+    np.savez(tmp_path / "one.npz", t=t, q=motions[0], meta=json.dumps({"success": False}))
+    (one,) = read_recordings(tmp_path / "one.npz")
+    assert any("meta.success" in remark for remark in one.remarks)

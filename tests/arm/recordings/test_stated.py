@@ -7,6 +7,7 @@ import pytest
 
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.stated import (
+    failures,
     frames_said,
     motion_keys,
     names_said,
@@ -232,3 +233,70 @@ def test_statistics_of_other_columns_say_nothing_of_the_motion(names):
 
 def test_bounds_of_what_a_controller_takes_are_none_of_the_motion():
     read_beside(Q + 2.0, {"min": -np.ones(3), "max": np.ones(3)})
+
+
+@pytest.mark.parametrize(
+    "flag",
+    [
+        {"success": False},
+        {"is_success": np.zeros(5, dtype=bool)},
+        {"next.success": np.zeros((5, 1))},
+        {"meta/success": np.float64(0)},
+        {"meta.task_success": ("False",)},
+        {"failed": 1},
+        {"aborted": np.array([0, 0, 1])},
+        {"failure": "yes"},
+    ],
+)
+def test_what_calls_an_episode_failed_is_named(flag):
+    (said,) = failures(flag)
+    assert next(iter(flag)) in said
+    assert "--leave-out" in said
+
+
+@pytest.mark.parametrize(
+    "flag",
+    [
+        {"success": np.array([0, 0, 1])},
+        {"success": ("True",)},
+        {"failed": np.zeros(5)},
+        {"success_rate": 0.0},
+        {"control_command_success_rate": np.zeros(5)},
+        {"success": 0.5},
+        {"success": np.full(3, np.nan)},
+        {"success": ("unknown",)},
+    ],
+)
+def test_other_flags_call_nothing_failed(flag):
+    assert [*failures(flag)] == []
+
+
+@pytest.mark.parametrize(
+    ("actions", "measured"),
+    [
+        (np.clip(3 * Q, -1, 1), {}),  # clipped
+        (Q - Q.mean(axis=0), {"states": 2 * Q + 3}),
+        (np.gradient(Q, axis=0), {"states": Q, "dq": Q}),
+    ],
+)
+def test_actions_that_a_controller_scales_are_no_positions(actions, measured):
+    arrays = {"actions": actions, **measured}
+
+    def read(**how):
+        options = ReadOptions(rate=50, joints=UR, **how)
+        return recorded_among(Path("a.npz"), "a", ["actions"], arrays, options, texts={})
+
+    key = "--key states" if measured else "--key;"
+    with pytest.raises(FileFormatError, match=rf"{key}.*--units rad"):
+        read()
+    np.testing.assert_array_equal(read(units=["rad"]).positions, actions)
+
+
+@pytest.mark.parametrize(
+    ("scale", "others"), [(1, {}), (1, {"states": Q + 0.01}), (2, {"states": -Q}), (1, {"dq": -Q})]
+)
+def test_actions_that_are_positions_are_read(scale, others):
+    arrays = {"actions": scale * Q, **others}
+    options = ReadOptions(rate=50, joints=UR)
+    read = recorded_among(Path("a.npz"), "a", ["actions"], arrays, options, texts={})
+    np.testing.assert_array_equal(read.positions, scale * Q)

@@ -143,3 +143,12 @@ def test_what_moves_at_a_rate_of_its_own_is_named(tmp_path):
     root["data"].create_array("gripper", data=80 + 100 * root["data/joint_pos"][::2, 1])
     (first, *_) = read_recordings(path, key="joint_pos", rate=50)
     assert [name.split(" (")[0] for name in moving_beside([first])] == ["gripper"]
+
+
+def test_an_episode_that_is_flagged_as_failed_is_said(tmp_path):
+    path = write_zarr(tmp_path)
+    group = zarr.open_group(str(path), mode="a", zarr_format=2)
+    group["meta"].create_array("success", data=np.arange(6) != 2)
+    read = read_recordings(path, key="joint_pos", rate=50)
+    said = [one.episode for one in read if any("success" in remark for remark in one.remarks)]
+    assert said == ["2"]

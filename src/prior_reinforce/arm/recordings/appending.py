@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -14,6 +15,8 @@ from prior_reinforce.arm.recordings.selection import Selection
 from prior_reinforce.arm.recordings.takes import APART, so_far
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.motions import Demonstrations
+from prior_reinforce.plans.speeds import largest_of_unit
+from prior_reinforce.wording import listed
 
 _FACTORS = (10.0, 100.0, 1000.0)
 """How many times too large or small a channel is in another unit, where it is no angle: cm, mm."""
@@ -27,6 +30,9 @@ _STANDS = 0.02
 """Part of its largest number by which a channel moves at least that tells its unit. Ours."""
 _STARTS = 0.2
 """Part of that which suffices where the start is as many times off as the end. Ours."""
+_CUT, _AGAIN = 0.2, 0.02
+"""Time in [s] by which one motion may be cut elsewhere than its like, and part of the largest range
+by which smoothing changes it. Ours."""
 
 
 def check_scale(before: Demonstrations, selection: Selection) -> None:
@@ -61,11 +67,36 @@ def appended(
     )
     if twice := copies(plans, [*so_far(before.n), *episodes]):
         raise InvalidDemonstrationsError(twice)
+    again = [name for i, name in enumerate(episodes) if _is_there(before, more, i)]
+    if again:
+        raise InvalidDemonstrationsError(
+            f"{listed(again)} landed where demonstrations so far did to the last digit, after the "
+            "same motion: if they are these throws again, smoothed or cut elsewhere, --leave-out "
+            f"{shlex.join(again)}; or import all anew without --append"
+        )
     both: dict[str, Any] = {
         name: np.concatenate([getattr(before, name), getattr(more, name)])
         for name in ("outcomes_seen", "outcome_noise", "outcome_correction")
     }
     return replace(more, plans=plans, **both)
+
+
+def _is_there(before: Demonstrations, more: Demonstrations, i: int) -> bool:
+    """Whether a demonstration in use has the same outcome as a new one, and nearly its motion.
+
+    That may begin a little earlier or later, as where it was cut elsewhere.
+    """
+    most = round(_CUT / before.format.dt)
+    new = np.pad(more.plans[i], ((most, most + before.horizon), (0, 0)), mode="edge")
+    span = largest_of_unit(np.ptp(more.plans[i], axis=0), more.format.units)
+    for j in np.flatnonzero(np.all(before.outcomes_seen == more.outcomes_seen[i], axis=1)):
+        own = before.plans[j]
+        parts = (new[first : first + before.horizon] for first in range(2 * most + 1))
+        if any(
+            np.all(np.sqrt(np.mean((own - part) ** 2, axis=0)) <= _AGAIN * span) for part in parts
+        ):
+            return True
+    return False
 
 
 def _check_alike(*said: tuple[str, object, object]) -> None:

@@ -17,7 +17,12 @@ from prior_reinforce.arm.recordings.naming import vectors
 from prior_reinforce.arm.recordings.recording import Beside, Positions, Recording
 from prior_reinforce.arm.recordings.time_finder import Times, is_clock, says_time, tells_time
 from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, Ambiguity, say_names, split_unit
-from prior_reinforce.plans.channels import is_of_base, measured_of, says_no_position
+from prior_reinforce.plans.channels import (
+    commanded,
+    is_of_base,
+    measured_of,
+    says_no_position,
+)
 from prior_reinforce.plans.interpolation import interp_columns
 from prior_reinforce.plans.signals import held_channels
 from prior_reinforce.plans.whole_turns import TURN
@@ -108,7 +113,7 @@ def arrays_beside(
             along = interp_columns(times, at, numbers)
             moving = moving if _is_series(name, numbers[:, moving], others) else []
         clocks = all(is_clock(name, numbers[:, i], at) for i in moving)
-        if clocks or (not _of_another(name, called) and _follows(along, motion)):
+        if clocks or (not _of_another(name, called) and follows(along, motion)):
             moving = []
         for i, (channel, column) in enumerate(zip(own, numbers.T, strict=True)):
             if np.any(np.isfinite(column)):
@@ -118,11 +123,11 @@ def arrays_beside(
 
 
 def twin_vectors(names: Sequence[str], values: Positions) -> Iterator[Ambiguity]:
-    """Ask which of two vectors of numbered columns is the motion: one repeats the other."""
+    """Ask which of two vectors of numbered columns is the motion, or of columns and commands."""
     groups = [(s, g) for s, g in vectors(names).items() if not says_no_position(s)]
     for (one, own), (other, of_other) in combinations(groups, 2):
         alike = len(own) == len(of_other) and not _of_another(other, [one])
-        if alike and _follows(values[:, own], values[:, of_other]):
+        if alike and follows(values[:, own], values[:, of_other]):
             measured = measured_of([one, other])
             seen = f"it looks as if {measured} were measured" if measured else "name what was"
             in_vectors = {i for group in vectors(names).values() for i in group}
@@ -131,6 +136,12 @@ def twin_vectors(names: Sequence[str], values: Positions) -> Iterator[Ambiguity]
             what = f"{other} repeats {one}, as a command does: {seen}"
             yield Ambiguity(what, keys, guessed=False)
             return
+    if orders := commanded(names):
+        what = (
+            f"{say_names(orders)} {'are commands' if len(orders) > 1 else 'is a command'} beside "
+        )
+        rest = shlex.join([name for name in names if name not in orders])
+        yield Ambiguity(f"{what}what was measured", f"--joints {rest}", guessed=False)
 
 
 def _is_series(name: str, moving: np.ndarray, others: Arrays) -> bool:
@@ -170,11 +181,12 @@ def _moves(values: Times) -> bool:
     return not held_channels([values[:, None]], ("rad",))[0]
 
 
-def _follows(values: np.ndarray, motion: Positions) -> bool:
+def follows(values: np.ndarray, motion: Positions, scales: Sequence[float] = _SCALES) -> bool:
     """Whether columns are another reading of the motion's: in another unit, or a command."""
     width, most = values.shape[1], motion.shape[1]
     if 0 < most < width and width % most == 0:  # several vectors under one name
-        return all(_follows(values[:, k :: width // most], motion) for k in range(width // most))
+        n = width // most
+        return all(follows(values[:, k::n], motion, scales) for k in range(n))
     finite = np.all(np.isfinite(np.concatenate([values, motion], axis=1)), axis=1)
     values, motion = values[finite], motion[finite]
     if not max(2, most / 2) <= width <= most or not len(values):
@@ -187,7 +199,7 @@ def _follows(values: np.ndarray, motion: Positions) -> bool:
             two = own[max(0, -delay) : len(own) - max(0, delay)]
             spread = np.std(two, axis=0)
             spread = np.maximum(spread, np.median(spread))
-            for scale in _SCALES:
+            for scale in scales:
                 apart = one - scale * two
                 near = np.abs(apart.mean(axis=0)) <= _OTHER_ZERO * scale * spread
                 if np.all(near & (np.std(apart, axis=0) <= _SAME * scale * spread)):

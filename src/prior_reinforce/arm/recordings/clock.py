@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -162,10 +162,12 @@ def clock_of(
                 "second: --rate"
             )
         times = np.arange(count) / own
-        doubts = () if own_rate is None else _doubt_rate(name, own_rate, count)
+        likely = [] if own_rate is None else _likely_rates(name, own_rate)
         if rate is None:
+            doubts = () if own_rate is None else _doubt_rate(name, own_rate, likely, count)
             return Clock(times, f"{name} in the file", doubts)
-        if own_rate is not None and not doubts and not _same(rate, own_rate):
+        is_said = any(_same(rate, each) for each in likely or [rate])
+        if own_rate in likely and not is_said:
             raise ConfigurationError(
                 f"--rate {rate:g}, but {name} in the file says {own_rate:.4g} frames a second; "
                 "drop --rate, or leave the file's rate unread: --time-column none"
@@ -173,6 +175,7 @@ def clock_of(
         in_name = _HERTZ.search(episode)
         stated = float(in_name[1].replace(",", ".")) if in_name else rate
         said = "" if _same(rate, stated) else f" (the name {episode} says {stated:g} Hz)"
+        said += "" if is_said else f" ({name} in the file says {_or(likely)} Hz)"
         return Clock(times, f"the given rate{said}")
     try:
         numbers = np.asarray(stamps, dtype=np.float64)
@@ -278,7 +281,8 @@ def clock_among(
     free = fit | {name: every[name] for name in called}
     found = find_times(where, free, called, no_motion=True)
     timed = asked not in (None, NO_COLUMN) and found.columns
-    said = {n: v for n, v in (said or {}).items() if not _are_periods(n, v, count)}
+    said = {n: _first(v, count) for n, v in (said or {}).items() if not _are_periods(n, v, count)}
+    said = {n: v for n, v in said.items() if np.shape(v) != (count,)}  # a rate of each frame
     if asked == NO_COLUMN and options.rate is not None:  # what is no number is left unread
         said = {n: v for n, v in said.items() if np.size(v) == 1}
     own = {} if timed else declared_rate(where, said, options.rate)
@@ -292,6 +296,12 @@ def clock_among(
     if not found.columns:
         return options.clock(episode, count, **own)
     return clock_at(f"{where}: {episode}", episode, count, found, every, options, **own)
+
+
+def _first(values: Any, count: int) -> Any:
+    """The one number of values that are the same in each frame; others as they are."""
+    same = np.shape(values) == (count,) and np.all(np.equal(values, values[0]))
+    return values[0] if same else values
 
 
 def _are_periods(name: str, values: Any, count: int) -> bool:
@@ -352,16 +362,26 @@ def hold_together(where: str, clocks: Mapping[str, Times]) -> None:
             )
 
 
-def _doubt_rate(name: str, rate: float, count: int) -> tuple[Ambiguity, ...]:
-    """Doubt a declared rate at which no arm is recorded: `dt` 20 is in milliseconds, or a rate."""
-    if is_frame_rate(rate):
-        return ()
+def _likely_rates(name: str, rate: float) -> list[float]:
+    """What a declared rate may be: `dt` 20, at which no arm is recorded, is in ms, or a rate."""
     in_units = [rate / scale for unit, scale in SECONDS.items() if unit not in ("min", "h")]
     others = [1 / rate, *in_units] if _RATE.fullmatch(name.lower()) else [*in_units, 1 / rate]
-    likely = list(filter(is_frame_rate, others)) or [rate]
+    return [rate] if is_frame_rate(rate) else list(filter(is_frame_rate, others))
+
+
+def _doubt_rate(
+    name: str, rate: float, likely: Sequence[float], count: int
+) -> tuple[Ambiguity, ...]:
+    """Doubt a declared rate at which no arm is recorded, for those that it may be."""
+    if rate in likely:
+        return ()
+    likely = likely or [rate]
     what = f"{name} in the file says {rate:.4g} frames a second, {count / rate:.4g} s in all"
-    what += ": it looks like " + " or ".join(f"{other:.4g}" for other in likely)
-    return (Ambiguity(what, f"--rate {likely[0]:.6g}"),)
+    return (Ambiguity(f"{what}: it looks like {_or(likely)}", f"--rate {likely[0]:.6g}"),)
+
+
+def _or(rates: Sequence[float]) -> str:
+    return " or ".join(f"{rate:.4g}" for rate in rates)
 
 
 def _judge(

@@ -35,12 +35,14 @@ from prior_reinforce.arm.recordings.recording import (
     without_units,
 )
 from prior_reinforce.arm.recordings.stated import (
+    failures,
     names_said,
     refuse_rates,
+    says_success,
     says_valid,
     without_invalid,
 )
-from prior_reinforce.arm.recordings.table_heads import headed, with_heads
+from prior_reinforce.arm.recordings.table_heads import failed, headed, said_beside, with_heads
 from prior_reinforce.arm.recordings.table_times import (
     called_times,
     clock_of_table,
@@ -53,7 +55,7 @@ from prior_reinforce.arm.recordings.tables import PLAIN, Table, read_table
 from prior_reinforce.arm.recordings.time_finder import FEWEST_COUNTS, Times
 from prior_reinforce.arm.recordings.units import Ambiguity, say_names
 from prior_reinforce.errors import FileFormatError
-from prior_reinforce.plans.channels import Kind, kinds
+from prior_reinforce.plans.channels import Kind, kinds, says_no_channel
 
 SUFFIXES = (".csv", ".tsv")
 IN_TEXT = (".txt", ".dat", ".log")
@@ -98,7 +100,8 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             table = read_table(path, options.delimiter, options.decimal)
             if len(paths) > 1 and _has_a_row_each(table, stems):
                 continue
-            table = headed(table, options.joints)
+            beside = said_beside(table, options.joints)
+            table = headed(table, beside, options.joints)
             table = with_whole_dates(with_heads(table))
             if not table.names or len(table) < 2:
                 raise FileFormatError(
@@ -107,7 +110,8 @@ def read(source: Path, options: ReadOptions) -> Episodes:
                 )
             column, names, guessed = _throws(table, path.stem, options, alone=len(paths) == 1)
         rows = names.count("")
-        remarks = (f"{rows} rows left out, which are of no episode",) * (0 < rows < len(names))
+        remarks = [f"{rows} rows left out, which are of no episode"] * (0 < rows < len(names))
+        remarks += failed(table, beside)
         for episode in sorted({*names} - {""} or {""}, key=natural_order):
             own = table.rows([i for i, name in enumerate(names) if name == episode])
             how = episode, options, column, guessed, remarks
@@ -240,7 +244,7 @@ def _episode(
     options: ReadOptions,
     episode_column: int | None,
     guessed: tuple[Ambiguity, ...],
-    said_of_all: tuple[str, ...],
+    said_of_all: Sequence[str],
 ) -> Recording:
     log = next((g for g in LOG_FORMATS if set(g.columns) <= set(table.names)), None)
     said, told = _names_in_cells(table, options)
@@ -271,10 +275,13 @@ def _episode(
     texts = [i for i in others if table.is_text(i)]
     if not all_read:  # else only those that change between a few: `on` and `off`
         texts = [i for i in texts if 1 < len({*table.cells[i]} - {""}) <= _MOST_WORDS]
+    no_channel = [i for i in channels if plain and says_no_channel(called[i])]
+    no_channel *= len(no_channel) < len(channels)
     absent = [i for i in channels if found is None and np.all(table.values[:, i] == _ABSENT)]
-    flags = {i: _flag(table, i) for i in others if table.named and says_valid(called[i])}
+    of_flags = [i for i in others if table.named and _is_flag(called[i])]
+    flags = {i: _flag(table, i) for i in of_flags}
     for left, why in (
-        ([*flags], "is no joint by its name"),
+        ([*flags, *no_channel], "is no joint by its name"),
         (absent, "is 9E+09 all along, as ABB writes of an axis that is not there"),
         (rising, "rises with every row, as times and counters do"),
         ([i for i in texts if i not in flags], "holds no number"),
@@ -296,7 +303,7 @@ def _episode(
         positions,
         tuple(own_names),
         named=is_named,
-        remarks=(*remarks, *unmeasured),
+        remarks=(*remarks, *unmeasured, *failures(measured)),
         units=tuple(table.units[i] or u for i, u in zip(channels, units, strict=True)),
         ambiguities=(*guessed, *clock.ambiguities, *(twins or ())),
         columns=own if table.named else (),
@@ -382,6 +389,10 @@ def _cells(table: Table, columns: Sequence[int], row: int) -> tuple[str, ...]:
     """The texts of some cells of a row, or of the list in an only one."""
     own = [table.cells[i][row] for i in columns]
     return words(own[0] if len(own) == 1 else own)
+
+
+def _is_flag(name: str) -> bool:
+    return says_valid(name) or says_success(name)
 
 
 def _flag(table: Table, column: int) -> np.ndarray:

@@ -21,7 +21,13 @@ from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.selection import Selection
 from prior_reinforce.arm.recordings.takes import all_return, odd_starts
 from prior_reinforce.arm.recordings.turns import aligned
-from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, Ambiguity, say_names, split_unit
+from prior_reinforce.arm.recordings.units import (
+    CHANNEL_UNITS,
+    Ambiguity,
+    raise_if_ambiguous,
+    say_names,
+    split_unit,
+)
 from prior_reinforce.arm.robots.gate import check_plan
 from prior_reinforce.arm.robots.gate_settings import GateSettings
 from prior_reinforce.arm.robots.limits import RobotLimits, joint_of, match_joints
@@ -303,14 +309,21 @@ def inspect(selection: Selection, wanted: Wanted) -> Inspection:
     """Make plans of recordings, and check each against the robot's limits, once.
 
     In units that the gate cannot judge, none is checked. InvalidDemonstrationsError as in
-    `check_held`, `check_scale`, `aligned` and `preprocess`; ConfigurationError if settings
-    contradict each other.
+    `check_held`, `check_scale`, `aligned` and `preprocess`, and UnclearUnitsError where `aligned`
+    refuses numbers in units that cannot be guessed; ConfigurationError if settings contradict each
+    other.
     """
     robot, before = wanted.robot, wanted.before
     check_held(selection.recordings, robot)
     if before is not None:
         check_scale(before, selection)
-    selection, form = aligned(selection, robot, before)
+    try:
+        selection, form = aligned(selection, robot, before)
+    except InvalidDemonstrationsError:
+        raise_if_ambiguous(
+            selection.ambiguities, take_guesses=True
+        )  # counts taken for radians leap
+        raise
     how = wanted.preprocessing or Preprocessing()
     processed = preprocess(selection.recordings, form, how)
     form = replace(form, dt=processed.dt)

@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from prior_reinforce.arm.recordings.naming import vectors
-from prior_reinforce.arm.recordings.recording import Recording
+from prior_reinforce.arm.recordings.recording import Positions, Recording
 from prior_reinforce.arm.recordings.units import Ambiguity, is_possible, judge_unit, say_names
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.plans.channels import Kind, kinds
@@ -32,8 +32,19 @@ _MOST_PERCENT = 110.0
 """Percent of a range; ours: calibrations overshoot by a few."""
 _HARDLY_DEG, _STILL_DEG = 2.0, 0.1
 """Degrees within which a recorded arm hardly moves, and within which a joint is still. Ours."""
-_OF_COUNTS = " ('0.088 deg' for 4096 counts a turn, their middle subtracted in the file)"
+_EXACT, _SCALED = 1e-6, 1e-3
+"""Within which numbers that were normalised reach their ends, and their mean and deviation: these
+are of what was taken, the ends of single precision. Ours."""
+_BELOW_0 = 0.5
+"""Part of its largest number, or of 1, by which an opening is below 0. Ours: zeros are a little
+off."""
+_OF_COUNTS = " ('{:.2g} deg' for {} counts a turn, their middle subtracted in the file)"
 _OF_OPEN = " (100 over its number when fully open: '0.1 percent' if its range is 0 to 1000)"
+_NORMALISED = (
+    "and all fill -1 to 1 to the last digit, or have a mean of 0 and a deviation of 1, as what was "
+    "normalised does (then write it as it was before)"
+)
+_BELOW = "and goes below 0, which no opening does (then write 0 where it is closed)"
 _NOT_DONE, _HARDLY = "which no arm does", "which is hardly a motion"
 _SHARES = (
     "LeRobot recorded shares of each joint's range (-100 to 100, or 0 to 100, where use_degrees is "
@@ -54,6 +65,10 @@ class Belief:
     """Unit in the plan."""
     reach: Mapping[str, float]
     """Largest number of each take, by its name."""
+    least: float = 0.0
+    """Least number of all takes."""
+    normal: bool = False
+    """Whether its numbers are as those that were brought into a range, or to a mean of 0."""
 
     @property
     def unit(self) -> str:
@@ -100,13 +115,22 @@ def beliefs_of(
     poses = [summed(r.positions, form.increments) for r in recordings]  # what increments lead to
     reach = np.array([np.abs(pose).max(axis=0) for pose in poses])
     takes = [r.episode for r in recordings]
+    every = np.concatenate([r.positions for r in recordings])
+    normal, least = _are_normal(every).tolist(), every.min(axis=0).tolist()
     beliefs = []
     for i, (name, kind, said) in enumerate(zip(names, kinds(names), stated, strict=True)):
         usual = base_of(said or kind.usual_unit(reach[:, i].max()))[0]
         wanted = plan_units[i] if plan_units else usual
         own = dict(zip(takes, reach[:, i].tolist(), strict=True))
-        beliefs.append(Belief(name, kind, said, wanted, own))
+        beliefs.append(Belief(name, kind, said, wanted, own, least[i], normal[i]))
     return beliefs
+
+
+def _are_normal(every: Positions) -> np.ndarray:
+    """Whether channels go from exactly -1 to 1, or have a mean of 0 and a deviation of 1."""
+    in_range = (np.abs(every.min(axis=0) + 1) < _EXACT) & (np.abs(every.max(axis=0) - 1) < _EXACT)
+    scaled = np.hypot(every.mean(axis=0), every.std(axis=0) - 1) < _SCALED
+    return np.asarray(in_range | scaled)
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,6 +199,23 @@ class Judge:
         looks = judge_unit(one.unit, most, opening=one.kind is Kind.TOOL)
         return "mm" if looks == "cm" != one.unit else looks  # cm are people's; machines log mm
 
+    @cached_property
+    def _normalised(self) -> list[Belief]:
+        """Angles without a unit that were normalised: two or more, and most of those that move."""
+        moving = [one for one in self.angles if one.least < one.largest]
+        normal = [one for one in moving if one.normal and one.stated is None]
+        return normal if 2 * len(normal) > len(moving) > 1 else []
+
+    def _is_normalised(self, one: Belief) -> Doubt | None:
+        """Numbers that fill a range exactly in channel after channel were normalised."""
+        return Doubt(UNIT, _NORMALISED) if one in self._normalised else None
+
+    def _is_below(self, one: Belief) -> Doubt | None:
+        """A share of an opening is never below 0: -1 is an end of a range that is -1 to 1."""
+        is_share = one.kind is Kind.TOOL and one.unit == "percent" and one.stated is None
+        below = is_share and one.least <= -_BELOW_0 * max(one.largest, 1)
+        return Doubt(UNIT, _BELOW) if below else None
+
     def _may_slide(self, one: Belief) -> Doubt | None:
         """A rail or a SCARA's third axis is not in degrees only for being among angles that are."""
         among = one in self.far
@@ -237,7 +278,10 @@ class Judge:
     @cached_property
     def _doubts(self) -> dict[Belief, Doubt]:
         """Every doubt, by the first rule, asked about if nobody stated the unit, or a wrong one."""
-        rules = self._may_slide, self._is_no_angle, self._hardly_moves, self._is_beyond
+        rules = (
+            self._is_normalised, self._is_below, self._may_slide, self._is_no_angle,
+            self._hardly_moves, self._is_beyond,
+        )  # fmt: skip
         doubts = {}
         for one in self.beliefs:
             if doubt := next(filter(None, (rule(one) for rule in rules)), None):
@@ -290,7 +334,9 @@ class Judge:
             if doubt.looks == UNIT:
                 seen = f"put its unit in the place of {UNIT}"
                 seen += _OF_OPEN * (unit == "percent")
-                seen += _OF_COUNTS * (unit in TURN and worst not in self._slides)
+                if unit in TURN and worst not in self._slides and worst.largest > TURN["rad"]:
+                    of_turn = 4096 if worst.largest <= 2 * 4096 else 65536
+                    seen += _OF_COUNTS.format(TURN["deg"] / of_turn, of_turn)
             elif worst in unsure:
                 seen = f"put deg in the place of {UNIT}, unless {_SHARES}"
             what = (

@@ -10,6 +10,7 @@ of a recorder (0.4.4) that ended without `finalize()` has no footer, and cannot 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -25,7 +26,7 @@ from prior_reinforce.arm.recordings.clock import NO_COLUMN, Clock, clock_among, 
 from prior_reinforce.arm.recordings.naming import missing_channels, said_in
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import Episodes, Positions, Recording, named_damage
-from prior_reinforce.arm.recordings.stated import recorded_among
+from prior_reinforce.arm.recordings.stated import recorded_among, says_success
 from prior_reinforce.arm.recordings.time_finder import Times, says_time, tells_time
 from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.errors import FileFormatError
@@ -70,7 +71,9 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             _point_to_joints(source, key, features, options.joints or ())
         widths = {n: w for n, w in widths.items() if n not in _OWN}
         beside = [
-            n for n, w in widths.items() if n not in keys and (may_move(n, w) or says_time(n))
+            n
+            for n, w in widths.items()
+            if n not in keys and (may_move(n, w) or says_time(n) or says_success(n))
         ]
         texts = {
             f"{name} names": _names(features[name]) for name in {**dict.fromkeys(keys), **widths}
@@ -79,14 +82,16 @@ def read(source: Path, options: ReadOptions) -> Episodes:
     if not options.key and key == _MEASURED and _COMMANDED in features:
         remarks = (f"motion is {_MEASURED} (measured); key {_COMMANDED} has the commanded one",)
     columns = dict.fromkeys((*keys, *beside, _STAMPS))
-    (lengths, tasks), frames = _listed(source), _frames(source, tuple(columns))
+    listed, frames = _listed(source), _frames(source, tuple(columns))
+    tasks = {number: _task(row) for number, row in listed.items()}
 
     def episode_of(number: int) -> Recording:
         index, arrays = frames.get(number, (np.zeros(0), {}))
-        listed = lengths.get(number, len(index))
-        if len(index) != listed or listed == 0:
+        row = listed.get(number, {})
+        count = row.get("length", len(index))
+        if len(index) != count or count == 0:
             raise FileFormatError(
-                f"{source}: episode {number} has {len(index)} of {listed} listed frames under "
+                f"{source}: episode {number} has {len(index)} of {count} listed frames under "
                 "data/; copy the data set again, or name only the other episodes"
             )
         own = texts[f"{key} names"]
@@ -95,12 +100,11 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         clock = _clock(source, str(number), index, clocks, rate, options)
         arrays = {n: a for n, a in arrays.items() if n != _STAMPS or n in keys}
         of_tasks = (f"its task is {tasks.get(number)!r}",) * (len({*tasks.values()}) > 1)
-        why = (*remarks, *of_tasks)
-        return recorded_among(
-            source, str(number), keys, arrays, options, texts=said, clock=clock, remarks=why
-        )
+        also: dict[str, Any] = {"clock": clock, "remarks": (*remarks, *of_tasks)}
+        also["stated"] = {name: value for name, value in row.items() if says_success(name)}
+        return recorded_among(source, str(number), keys, arrays, options, texts=said, **also)
 
-    for number in sorted(lengths.keys() | frames.keys()):
+    for number in sorted(listed.keys() | frames.keys()):
         yield str(number), partial(episode_of, number)
 
 
@@ -167,10 +171,9 @@ def _widths(features: dict[str, Any]) -> dict[str, int]:
     }
 
 
-def _listed(source: Path) -> tuple[dict[int, int], dict[int, str]]:
-    """Frames and task of each episode according to the metadata; empty where it lists none."""
-    lengths: dict[int, int] = {}
-    tasks: dict[int, str] = {}
+def _listed(source: Path) -> dict[int, dict[str, Any]]:
+    """What the metadata say of each episode; empty where they list none."""
+    listed: dict[int, dict[str, Any]] = {}
     meta = source / "meta"
     for path in (*sorted(meta.glob("episodes/**/*.parquet")), *meta.glob("episodes.jsonl")):
         with named_damage(path, "LeRobot's list of episodes"):
@@ -178,12 +181,15 @@ def _listed(source: Path) -> tuple[dict[int, int], dict[int, str]]:
                 rows = list(map(json.loads, path.read_text(encoding="utf-8").splitlines()))
             else:
                 rows = _table(path, ["episode_index", "length", _TASKS]).to_pylist()
-            for row in rows:
-                number = int(row["episode_index"])
-                lengths[number] = int(row["length"])
-                said = row.get(_TASKS) or "not said"
-                tasks[number] = said if isinstance(said, str) else ", ".join(map(str, said))
-    return lengths, tasks
+            listed |= {
+                int(row["episode_index"]): row | {"length": int(row["length"])} for row in rows
+            }
+    return listed
+
+
+def _task(row: Mapping[str, Any]) -> str:
+    said = row.get(_TASKS) or "not said"
+    return said if isinstance(said, str) else ", ".join(map(str, said))
 
 
 def _frames(source: Path, keys: tuple[str, ...]) -> dict[int, Frames]:
@@ -227,6 +233,7 @@ def _table(path: Path, columns: list[str]) -> Any:
     parts = [group.column(j) for group in groups for j in range(group.num_columns)]
     there = file.schema_arrow.names
     columns = [name for name in columns if name not in (_STAMPS, _TASKS) or name in there]
+    columns += [name for name in there if says_success(name) and name not in columns]
     read = [part for part in parts if part.path_in_schema.split(".")[0] in {*columns}]
     check_numbers(path, "its columns", [sum(part.num_values for part in read)])
     check_bytes(path, sum(part.total_uncompressed_size for part in read), "unpacks to")

@@ -14,7 +14,7 @@ import numpy as np
 from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, say_names, split_unit
 from prior_reinforce.arm.robots.limits import is_joint
 from prior_reinforce.errors import InvalidDemonstrationsError
-from prior_reinforce.plans.channels import is_opening, says_no_position
+from prior_reinforce.plans.channels import is_opening, measured_of, says_no_position
 
 _POSITIONS = re.compile(r"(^|[^a-z])(q|j|joints?|pos|positions?|angles?)$", re.IGNORECASE)
 """Names of joint positions."""
@@ -128,8 +128,8 @@ def _search(place: str, said: Any, depth: int = _DEEPEST) -> Iterator[tuple[str,
             yield from _search(f"{place}.{key}" if place else str(key), one, depth - 1)
     elif isinstance(said, str) and said.lstrip()[:1] == "{":
         return
-    elif isinstance(said, (int, float, str)) and not isinstance(said, bool):
-        yield place, said
+    elif isinstance(said, (int, float, str)):
+        yield place, str(said) if isinstance(said, bool) else said
     elif isinstance(said, (list, tuple)):
         groups = said and all(isinstance(one, list) for one in said)
         yield place, [*chain(*said)] if groups else [*said]
@@ -157,6 +157,8 @@ def _find(name: str, there: Sequence[str], wanted: Sequence[str]) -> int | None:
     # `Wrist_Pitch.pos` is no `Pitch` beside a `Wrist_Pitch`.
     longer = [joint for joint in wanted if len(joint) > len(bare)]
     found = [i for i in found if not any(is_joint(names[i], joint) for joint in longer)]
+    measured = measured_of([there[i] for i in found]) if len(found) > 1 else None
+    found = found if measured is None else [list(there).index(measured)]
     if len(found) > 1:
         raise InvalidDemonstrationsError(
             f"{say_names([there[i] for i in found])} all look like {name}; name the recorded ones "

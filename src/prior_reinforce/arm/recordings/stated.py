@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.beside import MASK, Arrays, arrays_beside, may_move
+from prior_reinforce.arm.recordings.beside import MASK, Arrays, arrays_beside, follows, may_move
 from prior_reinforce.arm.recordings.clock import Clock, clock_among
 from prior_reinforce.arm.recordings.naming import (
     OTHER_NAMES,
@@ -68,11 +68,20 @@ if that is more. Ours: sound has more."""
 _FAR_OFF, _SLACK = 5.0, 0.01
 """Standard deviations by which the middle of a motion is off what is said of its mean, and rounding
 of what is said. Ours: a motion is one of those of which it is said."""
+_ACTIONS, _ROUNDING = re.compile(r"(^|[^a-z])actions?$"), 1e-6
+"""What commands are called that a controller may scale, and single precision near 1."""
 _VALID = re.compile(
     r"((observations?|obs|data|frames?|robot|arm|joints?|joint_states?)[/.])*"
     r"((is|frame|pose|data)_)?(valid|tracked)(_(mask|flag))?"
 )
 """Flags that are 0 in frames that were not measured; `ball/tracked` is of something else."""
+_SUCCESS = re.compile(
+    r"((is|was|has|task|episode|demo|trial|throw)[ _]?)*"
+    r"((?P<good>success(ful)?|succeeded)|fail(ed|ure)?|aborted|discard(ed)?)",
+    re.IGNORECASE,
+)
+"""Flags of an episode that went well, or did not; `next.success` is LeRobot's."""
+_TRUE, _FALSE = {"true", "yes", "1", "1.0"}, {"false", "no", "0", "0.0"}
 _STEMS = re.compile("[/.]")
 """What parts an array's own name from where it is: `observations/q`, `stats.q_mean`."""
 
@@ -168,6 +177,8 @@ def recorded_among(
     positions, unmeasured = without_invalid(episode, positions, arrays)
     if options.units is None:
         _refuse_normalised(f"{where}: {episode}", positions, {**stated, **arrays}, keys)
+        if Kind.ANGLE in kinds(options.joints or ()):
+            _refuse_scaled(f"{where}: {episode}", positions, arrays, keys)
     bare, units = without_units(names or known)
     if not bare and len(positions) > 1:
         refuse_exchanged(episode, positions)
@@ -177,7 +188,8 @@ def recorded_among(
     others = {name: array for name, array in arrays.items() if name not in keys}
     called = (*keys, *(names or known))
     more["beside"] = arrays_beside(positions, others, clock.times, called)
-    more["remarks"] = (*more.get("remarks", ()), *why, *unmeasured)
+    failed = failures({**texts, **stated, **arrays})
+    more["remarks"] = (*more.get("remarks", ()), *why, *unmeasured, *failed)
     if not bare:
         unclear = _other_names(episode, texts, positions.shape[1], options.joints or ())
         more["ambiguities"] = (*clock.ambiguities, *unclear)
@@ -229,6 +241,25 @@ def _refuse_normalised(
                 "these: write it as it was before it was normalised; or if it is not, say its unit "
                 "with --units"
             )
+
+
+def _refuse_scaled(where: str, positions: Positions, arrays: Arrays, keys: Sequence[str]) -> None:
+    """FileFormatError if actions are what a controller scales, or increments: -1 to 1.
+
+    They reach an end exactly, or there is an array as wide that they do not follow.
+    """
+    most = np.nanmax(np.abs(positions), initial=0.0)
+    if not any(_ACTIONS.search(key) for key in keys) or most > 1 + _ROUNDING:
+        return
+    like = [n for n, own in arrays.items() if own.shape == positions.shape and n not in keys]
+    like = [name for name in like if not says_no_position(name)]
+    unlike = like and not any(follows(arrays[name], positions, (1.0,)) for name in like)
+    if most > 1 - _ROUNDING or unlike:
+        by_key = f"--key {' or '.join(like)}" if like else "--key"
+        raise FileFormatError(
+            f"{where}: {keys[0]} stays within -1 and 1, as actions do that a controller scales: "
+            f"name what was measured with {by_key}; if these are angles, say so with --units rad"
+        )
 
 
 def _other_names(
@@ -352,6 +383,23 @@ def without_invalid(
             positions[lost] = np.nan
             remarks += [f"{what}: they are left out"] * bool(lost.any())
     return positions, tuple(remarks)
+
+
+def says_success(name: str) -> bool:
+    """Whether a flag says by its name how an episode went: `is_success`, `failed`."""
+    return _SUCCESS.fullmatch(_STEMS.split(name)[-1]) is not None
+
+
+def failures(said: Mapping[str, Any]) -> Iterator[str]:
+    """Remark on flags of a whole episode, or of each frame, by which it failed."""
+    for name, value in said.items():
+        called = _SUCCESS.fullmatch(_STEMS.split(name)[-1])
+        own = {str(one).lower() for one in np.ravel(value).tolist()} if called else set()
+        if called and own and own <= _TRUE | _FALSE and bool(own & _TRUE) != bool(called["good"]):
+            yield (
+                f"{name} calls it failed: its motion is learned, with where it landed; if it is no "
+                "motion to learn from, leave that episode out (--leave-out)"
+            )
 
 
 def other_count(where: str, declared: str, key: str, count: int) -> FileFormatError:

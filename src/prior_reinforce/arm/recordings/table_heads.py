@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from prior_reinforce.arm.recordings.bounds import check_names
-from prior_reinforce.arm.recordings.naming import said_in
-from prior_reinforce.arm.recordings.stated import JOINT_WORDS, OUTCOME, names_said, units_said
+from prior_reinforce.arm.recordings.naming import Texts, said_in
+from prior_reinforce.arm.recordings.stated import (
+    JOINT_WORDS,
+    OUTCOME,
+    failures,
+    names_said,
+    units_said,
+)
 from prior_reinforce.arm.recordings.tables import Table, are_units, is_value
 from prior_reinforce.arm.recordings.time_finder import rises, says_time
 from prior_reinforce.arm.recordings.units import known_unit, split_unit
@@ -27,24 +35,53 @@ _UNIT_OF_ALL = re.compile(
 )
 """A part of a comment that is the unit of all and of nothing else: `# joint angles in deg`, `# t in
 s, q in deg`, `# deg`; no `camera angles in deg`, and no `angle [deg]: 30`."""
+_OF_RECORDINGS = re.compile(
+    r"((meta|data|info|set|records?|recordings?|columns?|channels?|joints?|angles?|names?|units?|log"
+    r"|throws?|demos?|demonstrations?|episodes?|trials?|session|robot|arm|motions?)[ _-]?)+",
+    re.IGNORECASE,
+)
+"""What a JSON is called that is of all recordings beside it; a `camera_info.json` is not."""
+_COMMENT = re.compile(r"[#%/;\s]*(\w[\w .]*?)\s*[:=]\s*(\w+)\W*")
+"""`# success: false`"""
 _MOST_SAID = 1_000_000
 """Bytes of a JSON beside a table at most. Ours: it says what the columns are."""
 
 
-def headed(table: Table, joints: Sequence[str] | None = None) -> Table:
+class Beside(NamedTuple):
+    """What a JSON says of the table beside it."""
+
+    where: Path
+    """Itself; the table if there is none."""
+    texts: Texts
+    numbers: Mapping[str, float]
+
+
+def said_beside(table: Table, joints: Sequence[str] | None = None) -> Beside:
+    """Return what a JSON beside a table says.
+
+    It is called as the table; or it is the only one of the folder, and its name says that it is of
+    recordings, or it names columns of the table, or joints.
+    """
+    path = Path(table.where)
+    own = path.with_suffix(".json")
+    alone = [p for p in path.parent.glob("*.json") if not p.with_suffix(path.suffix).exists()]
+    found = [own] if own.is_file() else alone
+    if len(found) == 1 and found[0].stat().st_size <= _MOST_SAID:
+        texts, numbers = said_in({"": found[0].read_bytes()})
+        said = {*chain(*texts.values()), *(key.rpartition(".")[2] for key in texts)}
+        named = [name for name in {*table.names, *(joints or ())} & said if not says_time(name)]
+        if own.is_file() or len(named) > 1 or _OF_RECORDINGS.fullmatch(found[0].stem):
+            return Beside(found[0], texts, numbers)
+    return Beside(path, {}, {})
+
+
+def headed(table: Table, beside: Beside, joints: Sequence[str] | None = None) -> Table:
     """Return a table with heads and units that its comments, or a JSON beside it, say.
 
-    The JSON is called as the table, or is the only one of the folder. Names of all columns but the
-    first are taken if that one rises, as times do. Heads of the table's own count more, and a
-    single unit for all is only one of angles.
+    Names of all columns but the first are taken if that one rises, as times do. Heads of the
+    table's own count more, and a single unit for all is only one of angles.
     """
-    where = path = Path(table.where)
-    texts = dict[str, tuple[str, ...]]()
-    found = [path.with_suffix(".json")]
-    if not found[0].is_file():
-        found = [p for p in path.parent.glob("*.json") if not p.with_suffix(path.suffix).exists()]
-    if len(found) == 1 and found[0].stat().st_size <= _MOST_SAID:
-        where, texts = found[0], said_in({"": found[0].read_bytes()})[0]
+    where, texts = beside.where, beside.texts
     names = table.names if table.named else names_said(where, texts, len(table.names), joints)
     if not names and texts and len(table) and rises(table.stamps(0)):
         names = names_said(where, texts, len(table.names) - 1, joints)
@@ -68,6 +105,13 @@ def headed(table: Table, joints: Sequence[str] | None = None) -> Table:
         for name, own, unit in zip(names, table.units, units, strict=True)
     )
     return replace(table, names=names, units=units, named=True)
+
+
+def failed(table: Table, beside: Beside) -> Iterator[str]:
+    """Remark on what calls a table's motion failed, in its comments or a JSON beside it."""
+    found = filter(None, map(_COMMENT.fullmatch, table.comments))
+    comments = {match[1]: match[2] for match in found}
+    return failures({**comments, **beside.texts, **beside.numbers})
 
 
 def with_heads(table: Table) -> Table:

@@ -22,7 +22,12 @@ from prior_reinforce.arm.recordings.bounds import check_bytes, check_chunks, che
 from prior_reinforce.arm.recordings.naming import said_in
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import Episodes, named_damage
-from prior_reinforce.arm.recordings.stated import motion_keys, recorded_among, worth_reading
+from prior_reinforce.arm.recordings.stated import (
+    motion_keys,
+    recorded_among,
+    says_success,
+    worth_reading,
+)
 from prior_reinforce.arm.recordings.time_finder import Stamps
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import require_inside
@@ -66,6 +71,11 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         ends = np.asarray(_numbers(source, group, arrays, _ENDS), dtype=np.int64).ravel()
         count, needed = shapes[keys[0]][0], worth_reading(shapes, keys)
         numbers = {name: _numbers(source, group, arrays, f"data/{name}") for name in needed}
+        of_each = {
+            name: _numbers(source, group, arrays, name)
+            for name, (shape, _) in arrays.items()
+            if name.startswith("meta/") and says_success(name) and shape == ends.shape
+        }
         nodes = (group[f"data/{keys[0]}"], group["data"], group)
         texts, stated = said_in({n: said for node in nodes[::-1] for n, said in node.attrs.items()})
         stated = {f".{name}": number for name, number in stated.items()}  # of all episodes: a rate
@@ -82,7 +92,8 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             name: array[start * len(array) // count : end * len(array) // count]
             for name, array in numbers.items()
         }
-        said: dict[str, Any] = {"texts": texts, "stated": stated}
+        also = {name: array[i] for name, array in of_each.items()}
+        said: dict[str, Any] = {"texts": texts, "stated": stated | also}
         yield str(i), partial(recorded_among, source, str(i), keys, own, options, **said)
 
 
