@@ -154,11 +154,13 @@ _OPENING = (
 )
 """Names of a gripper's opening: the only one, `gripper_width`, is the plan's `gripper`."""
 _COMMANDED = (
-    r"\b(cmd|command(ed)?|actions?|target|des(ired)?|ref(erence)?|goal|set(point)?|leader|soll"
+    r"\b(cmd|command(ed)?|actions?|target|des(ired)?|plan(ned)?|ref(erence)?|goal|set(point)?"
+    r"|leader|soll"
     r"|(?<=q )d)\b"
 )
 _MEASURED = (
-    r"\b(act(ual)?|meas(ured)?|real|state|curr(ent)?|ist|obs(ervation)?|feedback|follower)\b"
+    r"\b(act(ual)?|meas(ured)?|real|state|curr(ent)?|present|ist|obs(ervation)?|feedback"
+    r"|follower)\b"
 )
 """Words of what was commanded, and of what was measured."""
 

@@ -129,6 +129,8 @@ def test_a_command_beside_what_was_measured_is_asked_about(tmp_path):
         (("one", "other"), "--key WHICH"),
         (("target_q", "actual_q"), "--key actual_q"),
         (("state.q_d", "state.q"), "--key state.q"),
+        (("planned_q", "q"), "--key q"),
+        (("goal_position", "present_position"), "--key present_position"),
     ],
 )
 def test_what_was_measured_is_told_by_words_of_commands_and_measurements(names, option):

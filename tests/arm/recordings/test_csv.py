@@ -688,6 +688,7 @@ def test_a_recording_that_is_flagged_as_failed_is_said(tmp_path, by):
         ("config", {"units": "deg", "names": ["j1", "j2"]}, "deg"),
         ("config", {"units": {"j1": "deg", "j2": "deg"}}, "deg"),
         ("recording_info", {"units": "deg"}, "deg"),
+        ("recording_info", {"limits": {"units": "deg"}}, None),
     ],
 )
 def test_a_json_alone_counts_where_it_is_of_the_recordings(tmp_path, name, said, unit):

@@ -28,7 +28,7 @@ def test_a_first_row_without_a_number_is_no_line_of_names(tmp_path, cell):
 @pytest.mark.parametrize("frame", ["", "base_link"])
 @pytest.mark.parametrize("rest", [",nan,nan,nan,nan", ",0,0", ""])
 def test_an_echo_of_joint_states(tmp_path, frame, rest):
-    rows = [f"17,{k}00,{frame},pan,lift,{k},{-k}{rest}" for k in range(4)]
+    rows = [f"17,{k}00,{frame},pan,lift,{k}e-07,{-k}{rest}" for k in range(4)]
     names = headed(tmp_path, *rows).names
     assert names[:2] == ("sec", "nanosec")
     assert names[-(2 + 2 + rest.count(",")) :][:4] == ("name0", "name1", "position0", "position1")

@@ -32,8 +32,8 @@ _MOST_BESIDE = 64
 """Numbers a frame of what may be a part of the motion; ours: two hands have fewer, a lidar more."""
 _ELSE = re.compile(
     r"(^|/)(next_obs|env_states?|timestamps?)/|(^|[/.])(actions?|states|objects?)$|(^|[/._])"
-    r"(rewards?|dones?|success(es)?|terminals?|terminated|truncated|discounts?)$|(^|[/._])(cos|sin"
-    r"|modes?|status)($|_)|volt|control_output|camera|image|f_ext|dtheta",
+    r"(rewards?|dones?|success(es)?|is_first|is_last|(is_)?terminals?|terminated|truncated"
+    r"|discounts?)$|(^|[/._])(cos|sin|modes?|status)($|_)|volt|control_output|camera|image|f_ext|dtheta",
     re.IGNORECASE,
 )
 """Names of what moves and is no part of an arm: outcomes and whole states of a simulator."""

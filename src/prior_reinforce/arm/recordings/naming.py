@@ -24,7 +24,9 @@ _OF_POSITIONS = re.compile(
 """What follows a joint's name where tools write the messages' fields: `/elbow/position`."""
 Texts = Mapping[str, tuple[str, ...]]
 """Texts of a file, by what it calls them."""
-OTHER_NAMES = re.compile(r"link|bod(y|ies)|camera|task|object|site|sensor|frame|goal|outcome", re.I)
+OTHER_NAMES = re.compile(
+    r"link|bod(y|ies)|camera|task|object|site|sensor|frame|goal|outcome|limit", re.I
+)
 """Names in a file of what is not of the motion."""
 _DEEPEST = 12
 """Levels of dicts that are searched for names."""

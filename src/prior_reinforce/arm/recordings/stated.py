@@ -120,7 +120,7 @@ def motion_keys(
     for key in keys or [name for name in usual if name in arrays] or [" or ".join(usual)]:
         least = 1 if options.key or (key in single and key not in usual) else 2
         if not least <= len(shapes.get(key, ())) <= most:
-            has = f"no array {key}"
+            has = f"no array {key}" if key else "no array that is surely the motion"
             if key in arrays:
                 has = f"{key} of shape {arrays[key].shape} and type {arrays[key].dtype}"
             remedy = "say which with --key"

@@ -37,7 +37,7 @@ _UNIT_OF_ALL = re.compile(
 s, q in deg`, `# deg`; no `camera angles in deg`, and no `angle [deg]: 30`."""
 _OF_RECORDINGS = re.compile(
     r"((meta|data|info|set|records?|recordings?|columns?|channels?|joints?|angles?|names?|units?|log"
-    r"|throws?|demos?|demonstrations?|episodes?|trials?|session|robot|arm|motions?)[ _-]?)+",
+    r"|throws?|demos?|demonstrations?|episodes?|trials?|session|motions?)[ _-]?)+",
     re.IGNORECASE,
 )
 """What a JSON is called that is of all recordings beside it; a `camera_info.json` is not."""
@@ -145,7 +145,8 @@ def _of_echo(table: Table) -> Table:
     """
     if table.named:
         return table
-    texts = [i for i, cells in enumerate(table.cells) if any(map(_is_word, cells))]
+    no_number = np.argwhere(np.isnan(table.values)).tolist()  # 1e-7 has a letter, too
+    texts = sorted({i for row, i in no_number if _is_word(table.cells[i][row])})
     if not texts or texts != [*range(2, texts[-1] + 1)]:
         return table
     stamps = table.values[:, :2]
