@@ -7,7 +7,7 @@ from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.plans.speeds import (
     frames_at_rest,
-    middle,
+    mean_frame,
     motion_span,
     onset,
     velocity_profiles,
@@ -47,7 +47,7 @@ def test_a_swing_moves_fastest_in_its_middle():
     smoothed = np.linalg.norm(velocity_profiles(demos.plans, demos.format.units, 2.4), axis=2)
     np.testing.assert_allclose(smoothed.argmax(axis=1), STARTS + 20, atol=1)
     for start, speed in zip(STARTS, recorded_speeds(demos.plans, demos.format.units), strict=True):
-        assert middle(speed) == pytest.approx(start + 20, abs=1e-6)
+        assert mean_frame(speed**2) == pytest.approx(start + 20, abs=1e-6)
         # 5 % of the peak of 30 u^2 (1 - u)^2 is reached at u = 0.059.
         assert onset(speed) == start + np.ceil(0.059 * 40)
 

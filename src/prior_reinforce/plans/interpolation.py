@@ -1,9 +1,9 @@
-"""From the frames of a plan to what the arm is asked for at 1 kHz: the one place that decides it.
+"""Interpolation of a plan's frames to the arm's commands at 1 kHz; no other module does it.
 
 The frames are joined by a cubic spline with continuous acceleration that starts and ends at rest;
-the first pose is held before, the last one after. Ours, because it is what a servo loop is given
-(a clamped spline indexed by the robot's own clock), it passes through every frame, and its peak
-velocity and acceleration are those of the recorded motion rather than of a filter.
+the first pose is held before, the last one after. Ours, because servo loops are given such a
+clamped spline, indexed by the robot's clock: it passes through every frame, and its peak velocity
+and acceleration are those of the recorded motion rather than of a filter.
 """
 
 from __future__ import annotations
@@ -40,16 +40,16 @@ class FineMotion:
     """Accelerations, unit/s^2: the spline's exact second derivative, 0 while a pose is held."""
     dddq: Float[np.ndarray, "T D"]
     """Jerks, unit/s^3: backward differences of `ddq`, as a controller sees them, so that the step
-    of acceleration where a hold meets the motion counts too."""
+    of acceleration between a hold and the motion counts too."""
 
 
-def minimum_jerk(part: Float[np.ndarray, "*s"]) -> Float[np.ndarray, "*s"]:
-    """Return the minimum-jerk course from 0 at 0 to 1 at 1, held beyond: 10 p^3 - 15 p^4 + 6 p^5.
+def minimum_jerk(phase: Float[np.ndarray, "*s"]) -> Float[np.ndarray, "*s"]:
+    """Return the minimum-jerk course from 0 at phase 0 to 1 at phase 1: 10 p^3 - 15 p^4 + 6 p^5.
 
-    Source: Flash and Hogan, The coordination of arm movements, 1985.
+    Its ends are held outside. Source: Flash and Hogan, The coordination of arm movements, 1985.
     """
-    part = np.clip(part, 0.0, 1.0)
-    return part**3 * (10.0 - 15.0 * part + 6.0 * part**2)
+    phase = np.clip(phase, 0.0, 1.0)
+    return phase**3 * (10.0 - 15.0 * phase + 6.0 * phase**2)
 
 
 def interp_columns(
@@ -57,18 +57,20 @@ def interp_columns(
     times: Real[np.ndarray, " T"],
     columns: Float[np.ndarray, "T D"],
 ) -> Float[np.ndarray, "n D"]:
-    """Return columns on straight lines between rising `times`, their ends held beyond.
+    """Interpolate columns linearly between rising `times`, as `numpy.interp`; their ends are held.
 
-    `numpy.interp`, for each column; `at` and `times` are in the same unit, [s] or frames.
+    `at` and `times` are in the same unit, [s] or frames.
     """
-    found = np.empty((len(at), columns.shape[1]))
-    for column, values in enumerate(columns.T):
-        found[:, column] = np.interp(at, times, values)
-    return found
+    values = np.empty((len(at), columns.shape[1]))
+    for d, column in enumerate(columns.T):
+        values[:, d] = np.interp(at, times, column)
+    return values
 
 
 def join_frames(frames: ArrayLike, dt: float) -> CubicSpline:
-    """The spline through frames (H, D), dt [s] apart, at rest at both ends, over [0, (H - 1) dt].
+    """Return the spline through frames (H, D), dt [s] apart, at rest at both ends.
+
+    Its times are [0, (H - 1) dt].
 
     InvalidPlanError for another shape, values that are not finite, or a dt that is not positive.
     """
@@ -94,8 +96,8 @@ def interpolate(
 ) -> FineMotion:
     """Sample a plan at a fixed rate, with its end poses held before and after.
 
-    The map is linear in the frames: `interpolate(numpy.eye(H), dt)` gives the matrices that turn
-    the frames of any plan of that horizon into fine positions, velocities and so on.
+    The map is linear in the frames: `interpolate(numpy.eye(H), dt)` gives the matrices that map the
+    frames of any plan of that horizon to positions, velocities and so on.
 
     Args:
         frames: Shape (H, D), H >= 2.
@@ -113,7 +115,7 @@ def interpolate(
         raise InvalidPlanError(f"holds must be 0 s or more, got {hold_before} and {hold_after}")
     spline = join_frames(frames, dt)
     end = float(spline.x[-1])
-    # The small subtraction keeps 1.39 s * 1000 Hz = 1390.0000000000002 from adding a sample.
+    # Rounding in 1.39 s * 1000 Hz = 1390.0000000000002 must not add a sample.
     first = -math.ceil(hold_before * rate - 1e-9)
     last = math.ceil(end * rate - 1e-9) + math.ceil(hold_after * rate - 1e-9)
     t = np.arange(first, last + 1) / rate

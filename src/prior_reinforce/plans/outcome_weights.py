@@ -1,8 +1,8 @@
-"""How much each demonstration counts for a wished-for outcome: weights that sum to one.
+"""Weights of the demonstrations for a desired outcome; they sum to one.
 
-Two schemes, shared by the interpolating generators and the Bayesian adapter, whose prior mixes the
-errors of outcomes as plans are mixed. Distances are taken after dividing every outcome component by
-its demonstrated range, so that components may differ in unit.
+Shared by the interpolating generators and the Bayesian adapter, whose prior mixes the errors of
+outcomes as plans are mixed. Distances are taken after dividing every outcome component by its
+demonstrated range, so that components may differ in unit.
 
 Notation (docs/notation.md):
     c  conditions                       in the outcomes' units
@@ -21,19 +21,18 @@ from prior_reinforce.arrays import SAME_OUTCOME
 
 Kernel = Literal["auto", "cubic", "thin-plate", "linear"]
 """Kernel of `smooth_weights`: the radial function is d^3, d^2 log d, or d. `auto` is the first, or
-the last where the first amplifies what differs between demonstrations by chance
-(`amplification`)."""
+the last if the first amplifies random differences between demonstrations (`amplification`)."""
 _LARGEST_AMPLIFICATION = 1.0
-"""Ours: what is mixed varies by chance no more than one demonstration does. Outcomes on a grid stay
-below it, most that nobody spread do not; reproduction/docs/decisions-generator.md."""
+"""Ours: a mixture then varies by chance no more than one demonstration does. Outcomes on a grid
+stay below it, most that nobody spread do not; reproduction/docs/decisions-generator.md."""
 _REPEATED = 1e-6
-"""Least smoothing of outcomes that come more than once, so that their plans are averaged. Ours: far
-below what smooths anything else."""
+"""Least smoothing of repeated outcomes, so that their plans are averaged. Ours: far below any other
+smoothing."""
 _MEASURED = 0.01
-"""Noise below this part of the demonstrated range is none: the outcome was measured. Ours: 3 mm of
-30 cm, several times what a camera or a tape is off by."""
+"""Noise below this part of the demonstrated range counts as none: the outcome was measured. Ours:
+3 mm of 30 cm, several times the error of a camera or a tape."""
 _SMOOTHING = 100.0
-"""Smoothing of an outcome whose noise is the demonstrated range. Ours, see
+"""Smoothing of an outcome whose noise equals the demonstrated range. Ours, see
 reproduction/docs/decisions-generator.md."""
 
 
@@ -55,8 +54,8 @@ def smooth_weights(
         outcomes: r. With N <= k the tail is constant, and the kernel linear, because the others
             need an affine tail to be solvable.
         kernel: Which :math:`\varphi`.
-        noise: Standard deviation of each outcome. What is uncertain is smoothed: its weight at its
-            own outcome is below one. Demonstrations of one and the same outcome are averaged.
+        noise: Standard deviation of each outcome. Uncertain demonstrations are smoothed: their
+            weight at their own outcome is below one. Those of the same outcome are averaged.
 
     Source: Wendland, "Scattered Data Approximation", 2005, chapter 8 (ours to use it here).
     """
@@ -87,19 +86,19 @@ class SmoothWeights:
         if noise is not None:
             relative = np.where(noise > _MEASURED * self._scale, noise / self._scale, 0.0)
             smoothing = _SMOOTHING * np.mean(relative**2, axis=1)
-        apart = np.abs(outcomes[:, None] - outcomes[None])
-        same = np.all(apart <= SAME_OUTCOME * self._scale, axis=2)
+        distances = np.abs(outcomes[:, None] - outcomes[None])
+        same = np.all(distances <= SAME_OUTCOME * self._scale, axis=2)
         repeated = same.sum(axis=1) > 1
         self._spline = RBFInterpolator(
             outcomes[same.argmax(axis=1)] / self._scale,
-            np.eye(n),  # a value a demonstration: what is interpolated are the weights themselves
+            np.eye(n),  # interpolates unit vectors, so that its values are the weights
             kernel="thin_plate_spline" if self.kernel == "thin-plate" else self.kernel,
             degree=1 if n > k else 0,
             smoothing=np.where(repeated, np.maximum(smoothing, _REPEATED), smoothing),
         )
 
     def __call__(self, conditions: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n N"]:
-        """Return w, a row a condition, a column a demonstration."""
+        """Return w: one row for each condition, one column for each demonstration."""
         weights = self._spline(conditions / self._scale)
         return np.asarray(weights).reshape(len(conditions), self._n)
 
@@ -107,9 +106,9 @@ class SmoothWeights:
 def amplification(weights: SmoothWeights, outcomes: Float[np.ndarray, "N k"]) -> float:
     r"""Return the mean of :math:`\sum_i w_i(c)^2` half-way between any two outcomes.
 
-    It is the variance of what differs between demonstrations by chance (posture, tempo) in what is
-    mixed of them, relative to its variance in one demonstration. Where two outcomes lie close
-    together, their motions' difference is a slope, and weights grow far beyond one.
+    It is the variance of random differences (posture, tempo) in a mixture, relative to their
+    variance in one demonstration. Where two outcomes lie close together, the spline takes the
+    difference of their motions for a slope, and weights grow far beyond one.
     """
     i, j = np.triu_indices(len(outcomes), k=1)
     halfway = 0.5 * (outcomes[i] + outcomes[j])
@@ -119,11 +118,11 @@ def amplification(weights: SmoothWeights, outcomes: Float[np.ndarray, "N k"]) ->
 def left_out_errors(
     outcomes: Float[np.ndarray, "N k"], values: Float[np.ndarray, "N F"]
 ) -> Float[np.ndarray, "N F"]:
-    r"""Return by how much each value is missed that a linear spline interpolates from the others.
+    r"""Return the leave-one-out errors of a linear spline through values f.
 
-    One inverse tells all of them: :math:`(M^{-1} f)_i / (M^{-1})_{ii}`, where M is the matrix of
-    the spline of all values. Not so the ends of a range, by which distances are divided: without
-    one of these a spline of its own is fitted.
+    One inverse gives all of them: :math:`(M^{-1} f)_i / (M^{-1})_{ii}`, where M is the matrix of
+    the spline of all values. Exceptions are the ends of a component's range, by which distances are
+    divided: without one of these the spline is fitted anew.
 
     Source: Rippa, "An algorithm for selecting a good value for the parameter c in radial basis
     function interpolation", 1999.
@@ -131,11 +130,11 @@ def left_out_errors(
     n, k = outcomes.shape
     extent = np.ptp(outcomes, axis=0)
     scaled = (outcomes - outcomes.mean(axis=0)) / extent
-    apart = np.linalg.norm(scaled[:, None] - scaled[None], axis=2)
-    # The others have an affine tail where there are enough of them, as in `smooth_weights`.
+    distances = np.linalg.norm(scaled[:, None] - scaled[None], axis=2)
+    # The tail is affine if enough others are left, as in `smooth_weights`.
     tail = np.column_stack([np.ones(n), scaled]) if n - 1 > k else np.ones((n, 1))
-    nothing = np.zeros((tail.shape[1], tail.shape[1]))
-    matrix = np.block([[_REPEATED * np.eye(n) - apart, tail], [tail.T, nothing]])
+    zeros = np.zeros((tail.shape[1], tail.shape[1]))
+    matrix = np.block([[_REPEATED * np.eye(n) - distances, tail], [tail.T, zeros]])
     inverse = np.linalg.inv(matrix)[:n, :n]
     errors = inverse @ values / np.diag(inverse)[:, None]
     for i in range(n):

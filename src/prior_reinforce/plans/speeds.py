@@ -24,7 +24,7 @@ SMOOTHING = 0.03
 """Standard deviation of the Gaussian that smooths velocities before they are compared, in [s].
 Ours: well above a frame of jitter, well below the dynamic phase of a throw."""
 AT_REST = 0.005
-"""Slower than this part of the peak speed, frames may be cut away. Ours, low: they are lost."""
+"""Frames slower than this part of the peak speed may be cut away. Ours, low: they are lost."""
 MOVING = 0.05
 """A motion begins and ends where its speed crosses this part of its peak. Ours, the usual 5 %: the
 tremor of the shipped tele-operated sets reaches 0.03, and their motions start within two frames of
@@ -33,16 +33,16 @@ _EDGE = 0.1
 """A motion's span includes the rest next to it for this part of its duration, so that nothing
 slower than `MOVING` is lost."""
 END_SPEED = 0.1
-"""A first or last frame that is faster, relative to the peak, is not at rest: the motion goes on
-beyond it. Ours: with 0.05 one of 66 sets changes (zoo-lob, cut off), and is timed otherwise."""
+"""If the first or last frame is faster than this part of the peak, the motion continues beyond it.
+Ours: with 0.05 one of 66 sets changes (zoo-lob, cut off), and is timed otherwise."""
 _NO_MOTION = 1e-12
 """Velocities below this part of the values are rounding, not motion."""
 
 
 def largest_of_unit(ranges: Channels, units: Sequence[str]) -> Channels:
     """Return for each channel the largest range of all that share its unit."""
-    of = np.array(units)
-    return np.array([ranges[of == unit].max() for unit in of])
+    unit_of = np.array(units)
+    return np.array([ranges[unit_of == unit].max() for unit in unit_of])
 
 
 def velocity_profiles(
@@ -60,12 +60,12 @@ def velocity_profiles(
     if smoothing > 0:
         velocities = [gaussian_filter1d(v, smoothing, axis=0, mode="reflect") for v in velocities]
     scale = np.full(len(units), np.inf)
-    every, values = np.concatenate(velocities), np.concatenate(list(motions))
+    all_velocities, positions = np.concatenate(velocities), np.concatenate(list(motions))
     for unit in dict.fromkeys(units):
-        members = [d for d, other in enumerate(units) if other == unit]
-        pooled = math.sqrt(float(np.mean(every[:, members] ** 2)))
-        if pooled > _NO_MOTION * float(np.abs(values[:, members]).max()):
-            scale[members] = pooled
+        channels = [d for d, other in enumerate(units) if other == unit]
+        rms = math.sqrt(float(np.mean(all_velocities[:, channels] ** 2)))
+        if rms > _NO_MOTION * float(np.abs(positions[:, channels]).max()):
+            scale[channels] = rms
     return [velocity / scale for velocity in velocities]
 
 
@@ -74,16 +74,22 @@ def onset(speed: Speed) -> float:
     return float(np.argmax(speed > MOVING * speed.max()))
 
 
-def middle(speed: Speed) -> float:
-    """Return the middle of the dynamic phase: the mean frame, weighted by squared speed."""
-    return float(np.average(np.arange(len(speed)), weights=speed**2))
+def mean_frame(energy: Speed, first: float = 0.0) -> float:
+    """Return the middle of the dynamic phase: the mean frame, weighted by energy (squared speed).
+
+    The middle frame where nothing moves. `first` is the frame of the first value: 0.5 where the
+    energy is of the steps between frames.
+    """
+    if not energy.any():
+        return first + (len(energy) - 1) / 2
+    return float(np.average(first + np.arange(len(energy)), weights=energy))
 
 
 def motion_span(speed: Speed) -> Float[np.ndarray, "2"]:
-    """Return where a motion begins and ends, in frames and parts of them.
+    """Return where a motion begins and ends, in fractional frames.
 
-    Crossings of `MOVING` are interpolated between frames and widened by a tenth of the duration; an
-    end at which the plan does not rest is the plan's own. A plan that never moves is one motion.
+    Crossings of `MOVING` are interpolated between frames and widened by a tenth of the duration. A
+    motion that does not rest at an end of its plan ends there. A plan that never moves is one span.
     """
     last = len(speed) - 1
     threshold = MOVING * speed.max()
@@ -101,7 +107,7 @@ def motion_span(speed: Speed) -> Float[np.ndarray, "2"]:
 
 
 def frames_at_rest(speed: Speed) -> tuple[int, int]:
-    """Count the frames before a motion begins and after it has ended; all of a constant plan."""
+    """Count the frames before a motion begins and after it ends; all frames of a constant plan."""
     moving = np.flatnonzero(speed > AT_REST * speed.max())
     if not moving.size:
         return len(speed), len(speed)

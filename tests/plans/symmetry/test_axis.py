@@ -41,7 +41,7 @@ def turned(angles, axis):
 def test_turned_paths_tell_what_they_were_turned_about(axis):
     found = find_axis(*turned([-0.4, 0.0, 0.3], np.array(axis)), Polar(axis))
     assert found.found == pytest.approx(axis, abs=0.02)
-    assert found.left < 1e-3
+    assert found.residual < 1e-3
     assert not found.doubted
 
 
@@ -62,7 +62,7 @@ def test_one_bearing_tells_no_axis():
 def test_a_wrong_axis_is_doubted_and_the_right_one_is_not(name, which, near, wrong):
     paths, outcomes, chart = shown(name, which)
     found = find_axis(paths, outcomes, chart)
-    assert found.off < near
+    assert found.offset < near
     assert not found.doubted
     assert "WARNING" not in str(found)
     other = find_axis(paths, outcomes, Polar(wrong))

@@ -16,7 +16,7 @@ from jaxtyping import Float
 
 from prior_reinforce.generators.timing.alignment import align
 from prior_reinforce.plans.motions import Demonstrations
-from prior_reinforce.plans.speeds import largest_of_unit, middle, onset
+from prior_reinforce.plans.speeds import largest_of_unit, mean_frame, onset
 from prior_reinforce.simulation.tasks import make_task
 from reproduction.recipes.base import TASK, Picture, Planned, Recipe, Scale
 from reproduction.recipes.tables import Columns, Table
@@ -49,7 +49,10 @@ class Aligned(Unit):
         return {
             "shift_s": alignment.shifts.tolist(),
             "start_s": [_moments(onset, demonstrations) for demonstrations in both],
-            "middle_s": [_moments(middle, demonstrations) for demonstrations in both],
+            "middle_s": [
+                _moments(lambda speed: mean_frame(speed**2), demonstrations)
+                for demonstrations in both
+            ],
         }
 
     def rows(self, result: Mapping[str, Any]) -> list[dict[str, Any]]:

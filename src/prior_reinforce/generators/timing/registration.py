@@ -28,7 +28,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 
 from prior_reinforce.errors import InvalidDemonstrationsError
-from prior_reinforce.plans.speeds import middle, motion_span
+from prior_reinforce.plans.speeds import mean_frame, motion_span
 
 WarpKind = Literal["none", "start", "tempo"]
 """What a warp may do: nothing (P = 0), move in time (1), and stretch as well (2)."""
@@ -123,7 +123,7 @@ class Motions:
             return np.zeros((len(self.profiles[some]), 0)), False
         profiles = self._scaled[some]
         speeds = np.linalg.norm(profiles, axis=2)
-        starts = np.mean([middle(speed) for speed in speeds]) - correlation_lags(profiles)
+        starts = np.mean([mean_frame(speed**2) for speed in speeds]) - correlation_lags(profiles)
         length = float(np.median([np.ptp(motion_span(speed)) for speed in speeds]))
         by_step = False
         if self.decisive is not None:

@@ -1,9 +1,9 @@
-"""Transforms of whole plans: by how much a plan is moved so that its outcome moves by w.
+"""Moves: transforms of whole plans that move the outcome by w.
 
-Each member moves the outcome along one component of a chart. It is data (a kind and parameters), is
-called with a plan and an amount in the chart's units, and returns a new plan; at an amount of 0 it
-returns the plan bit for bit. Plans that start and end at rest still do, but for increments that are
-turned or shifted: their first frames lead the hand to its moved start at a constant speed.
+Each move changes the outcome along one component of a chart. It is data (a kind and parameters),
+maps a plan and an amount in the chart's units to a new plan, and at an amount of 0 returns the plan
+bit for bit. Plans that start and end at rest still do, except turned or shifted increments: their
+first frames lead the hand to its moved start at a constant speed.
 
     plan    (H, D)  in the units of its format; a frame is one row
     amount  w_j     in the chart's units, [rad] for turns, [m] for shifts, [1] for ln distance
@@ -23,12 +23,13 @@ from prior_reinforce.arrays import Frames
 from prior_reinforce.plans.interpolation import interp_columns, minimum_jerk
 from prior_reinforce.plans.kinematics import Chain, turned_path
 from prior_reinforce.plans.plan_format import stepped, summed
+from prior_reinforce.plans.speeds import mean_frame
 
 Columns = tuple[int, ...]
 Ends = tuple[float, float]
 """Lowest and highest position of a joint, [rad]."""
 Moved = Float[np.ndarray, "H_moved D"]
-"""A plan that may be longer than the one it was."""
+"""A moved plan, which may be longer than the original."""
 NOMINAL_EXPONENT = 1.3
 """p of distance ~ speed^p before any trial (ours): 2 for a range (v^2 / g) and for a slide
 (v^2 / 2 mu g), 1 where half of the way is carried, less behind soft servos and in air."""
@@ -45,7 +46,7 @@ _COLUMN_FIELDS = (
 )
 _RANGES = ("range", "ranges")
 _MOVING = 0.05
-"""A plan ends in mid-swing where its last step is more than this part of its largest (ours)."""
+"""A plan ends in mid-swing if its last step is more than this part of its largest step (ours)."""
 
 
 class Move(msgspec.Struct, frozen=True):
@@ -56,47 +57,46 @@ class Move(msgspec.Struct, frozen=True):
         return plan.copy() if amount == 0.0 else self._moved(np.asarray(plan), float(amount))
 
     def columns_of(self) -> Columns:
-        """Return the columns of a plan that it names."""
-        named = (getattr(self, name, None) for name in _COLUMN_FIELDS)
-        return _columns(*named)
+        """Return the columns of a plan that the move names."""
+        return _columns(*(getattr(self, name, None) for name in _COLUMN_FIELDS))
 
     def increments_of(self) -> Columns:
-        """Return the columns that it takes for differences from frame to frame."""
+        """Return the columns that the move treats as differences from frame to frame."""
         return _columns(getattr(self, "increments", None))
 
     def ranged_of(self) -> Columns:
-        """Return the columns of turned joints, where it knows their ranges."""
+        """Return the columns of the turned joints whose ranges are known."""
         known = any(getattr(self, name, None) for name in _RANGES)
         return self.columns_of() if known else ()
 
     @property
     def endless(self) -> Self:
-        """The same for joints of any range."""
-        known = {*_RANGES} & {*self.__struct_fields__}
-        return msgspec.structs.replace(self, **dict.fromkeys(known, msgspec.UNSET))
+        """The same move for joints without limits."""
+        limits = {*_RANGES} & {*self.__struct_fields__}
+        return msgspec.structs.replace(self, **dict.fromkeys(limits, msgspec.UNSET))
 
     def _moved(self, plan: Frames, amount: float) -> Moved:
         raise NotImplementedError
 
 
 class Tempo(Move, frozen=True, tag="tempo"):
-    """Played faster or slower; ln speed = amount / exponent.
+    """Play the plan faster or slower; ln speed = amount / exponent.
 
-    A scaling of time with an unknown law on the outcome, no symmetry: how far a faster motion
-    throws has to be learned. Time is scaled around one frame, so that nothing happens earlier or
-    later to first order. Slower plans are longer: nothing is cut off.
+    A scaling of time whose effect on the outcome is unknown, so no symmetry: how far a faster
+    motion throws has to be learned. Time is scaled around one frame, so that to first order nothing
+    happens earlier or later. Slower plans are longer: nothing is cut off.
     """
 
     exponent: float = NOMINAL_EXPONENT
-    """Nominal p of outcome ~ speed^p; negative where faster is less."""
+    """Nominal p of outcome ~ speed^p; negative if faster is less."""
     about: float | None = None
-    """Frame that keeps its time: the release of a clock. None: the middle of the motion."""
+    """Frame that keeps its time, such as a release by a clock. None: the middle of the motion."""
     keep_horizon: bool = False
-    """As many frames as before, since a clock counts from the first one."""
+    """Keep the number of frames, since a clock counts from the first one."""
     steps: Columns = ()
-    """Columns of grippers and triggers, on lines between frames instead of a spline."""
+    """Columns of grippers and triggers, interpolated linearly instead of by a spline."""
     increments: Columns = ()
-    """Columns that are differences from frame to frame, or rates; what they add up to is played."""
+    """Columns that are differences from frame to frame, or rates; their sum is played."""
 
     def _moved(self, plan: Frames, amount: float) -> Moved:
         speed = math.exp(amount / self.exponent)
@@ -114,20 +114,21 @@ class Tempo(Move, frozen=True, tag="tempo"):
         if speed < 1.0 and not self.keep_horizon:
             first = math.floor(centre - centre / speed)
             end = math.ceil(centre + (last - centre) / speed)
-        at = centre + (np.arange(first, end + 1) - centre) * speed
-        inside = np.clip(at, 0, last)
-        out = np.asarray(CubicSpline(np.arange(last + 1), path, axis=0)(inside))
-        steps = np.diff(path, axis=0)
-        moving = _MOVING * np.abs(steps).max(axis=0)
-        for slope, beyond in ((steps[0], np.minimum(at, 0)), (steps[-1], np.maximum(at - last, 0))):
+        times = centre + (np.arange(first, end + 1) - centre) * speed
+        inside, frames = np.clip(times, 0, last), np.arange(last + 1)
+        out = np.asarray(CubicSpline(frames, path, axis=0)(inside))
+        slopes = np.diff(path, axis=0)
+        moving = _MOVING * np.abs(slopes).max(axis=0)
+        before, after = np.minimum(times, 0), np.maximum(times - last, 0)
+        for slope, beyond in ((slopes[0], before), (slopes[-1], after)):
             out += beyond[:, None] * np.where(np.abs(slope) > moving, slope, 0.0)
-        held = list(self.steps)
-        out[:, held] = interp_columns(inside, np.arange(last + 1), path[:, held])
+        linear = list(self.steps)
+        out[:, linear] = interp_columns(inside, frames, path[:, linear])
         return out
 
 
 class Amplitude(Move, frozen=True, tag="amplitude"):
-    """All of the motion made larger about its first frame; ln factor = amount / exponent.
+    """Enlarge the motion about its first frame; ln factor = amount / exponent.
 
     A scaling with an unknown law, as `Tempo` is.
     """
@@ -148,33 +149,33 @@ class Amplitude(Move, frozen=True, tag="amplitude"):
 
 
 class Delay(Move, frozen=True, tag="delay"):
-    """Columns later in time, their ends held; a symmetry of an outcome that is a time, if all."""
+    """Delay columns and hold their ends; if all, a symmetry of an outcome that is a time."""
 
     frames: float
-    """Frames later for each unit of the amount."""
+    """Frames of delay for each unit of the amount."""
     columns: Columns = ()
-    """Which; empty: all of them."""
+    """Delayed columns; empty: all."""
 
     def _moved(self, plan: Frames, amount: float) -> Moved:
         out, index = plan.copy(), np.arange(len(plan))
-        later = [*(self.columns or range(plan.shape[1]))]
-        out[:, later] = interp_columns(index - amount * self.frames, index, plan[:, later])
+        delayed = [*(self.columns or range(plan.shape[1]))]
+        out[:, delayed] = interp_columns(index - amount * self.frames, index, plan[:, delayed])
         return out
 
 
 class Learned(Move, frozen=True, tag="learned"):
-    """No transform: several demonstrations tell this component, as they do without a symmetry."""
+    """No transform: this component is learned from several demonstrations."""
 
     def _moved(self, plan: Frames, amount: float) -> Moved:
         return plan.copy()
 
 
 class Shift(Move, frozen=True, tag="shift"):
-    """One column shifted: poses moved along the table."""
+    """Shift one column: poses move along the table."""
 
     column: int
     lead: int = 0
-    """Where the column is increments: frames within which the hand is brought to its new start."""
+    """For a column of increments: frames within which the hand is led to its new start."""
 
     def increments_of(self) -> Columns:
         """See `Move.increments_of`."""
@@ -190,16 +191,16 @@ class Shift(Move, frozen=True, tag="shift"):
 
 
 class TurnJoint(Move, frozen=True, tag="turn-joint"):
-    """One joint turned all along: an arm that stands upright, about its base, by its first."""
+    """Add an angle to one joint at every frame: an upright arm's first joint turns it as a whole."""
 
     joint: int = 0
     """Column."""
     gain: float = 1.0
-    """Joint angle for each unit of the amount: -1 where the joint counts clockwise."""
+    """Joint angle for each unit of the amount: -1 if the joint counts clockwise."""
     ramp: int = 0
-    """Where the start pose is given: frames within which it turns, by minimum jerk."""
+    """If the start pose is fixed: frames within which the joint turns, by minimum jerk."""
     range: Ends | msgspec.UnsetType = msgspec.UNSET
-    """Of the joint; a plan that would leave it is turned the other way round where that fits."""
+    """Limits of the joint; a plan that would leave them turns the other way round if that fits."""
 
     def _moved(self, plan: Frames, amount: float) -> Moved:
         out = plan.copy()
@@ -211,7 +212,7 @@ class TurnJoint(Move, frozen=True, tag="turn-joint"):
 
 
 class TurnPoses(Move, frozen=True, tag="turn-poses"):
-    """Poses turned about a vertical axis through a point: places and attitudes."""
+    """Turn poses, places and attitudes, about a vertical axis through a point."""
 
     centre: tuple[float, float] = (0.0, 0.0)
     """(x, y) of the axis, [m]."""
@@ -233,7 +234,7 @@ class TurnPoses(Move, frozen=True, tag="turn-poses"):
         if self.vector is not None:
             vector = list(self.vector)
             turned = (turn * Rotation.from_rotvec(plan[:, vector])).as_rotvec()
-            out[:, vector] = _continuous(turned, plan[0, vector])
+            out[:, vector] = _unwrapped(turned, plan[0, vector])
         if self.quaternion is not None:
             scalar_last = [*self.quaternion[1:], self.quaternion[0]]
             before = plan[:, scalar_last]
@@ -245,10 +246,7 @@ class TurnPoses(Move, frozen=True, tag="turn-poses"):
 
 
 class TurnIncrements(Move, frozen=True, tag="turn-increments"):
-    """Differences dx, dy from frame to frame turned about a point.
-
-    The hand is brought to its turned start within the first frames.
-    """
+    """Turn increments dx, dy about a point; the first frames lead the hand to its turned start."""
 
     start: tuple[float, float] = (0.0, 0.0)
     """(x, y) of the hand before the first frame, [m]."""
@@ -276,7 +274,7 @@ class TurnIncrements(Move, frozen=True, tag="turn-increments"):
 
 
 class TurnPath(Move, frozen=True, tag="turn-path"):
-    """Joint plans turned about a vertical axis through a point, by inverse kinematics.
+    """Turn joint plans about a vertical axis through a point, by inverse kinematics.
 
     See `kinematics.turned_path`, which refuses what is out of reach.
     """
@@ -285,9 +283,9 @@ class TurnPath(Move, frozen=True, tag="turn-path"):
     centre: tuple[float, float]
     """(x, y) of the axis in the base frame, [m]."""
     columns: Columns
-    """Those of the chain's joints, in its order."""
+    """Columns of the chain's joints, in its order."""
     ranges: tuple[Ends, ...] | msgspec.UnsetType = msgspec.UNSET
-    """Of these joints; as `TurnJoint.range`."""
+    """Limits of these joints, as `TurnJoint.range`."""
 
     def _moved(self, plan: Frames, amount: float) -> Moved:
         out, columns = plan.copy(), list(self.columns)
@@ -303,15 +301,15 @@ AnyMove = (
 
 
 def _columns(*named: Columns | int | None) -> Columns:
-    """Columns named one by one, in groups, or not at all."""
+    """Flatten columns that are given one by one, in groups, or not at all."""
     groups = [(each,) if isinstance(each, int) else each or () for each in named]
     return tuple(column for group in groups for column in group)
 
 
 def _within(angles: Float[np.ndarray, " H"], ends: Ends) -> Float[np.ndarray, " H"]:
-    """A joint's angles by as few whole turns from where they are as lie in its range.
+    """Move a joint's angles into its range by the fewest whole turns.
 
-    Unchanged where they lie there, or none do: the gate then says by how much.
+    Angles that lie in the range, or that no turn brings there, stay: the gate then says by how far.
     """
     fewest = math.ceil((ends[0] - angles.min()) / (2 * math.pi))
     most = math.floor((ends[1] - angles.max()) / (2 * math.pi))
@@ -321,16 +319,14 @@ def _within(angles: Float[np.ndarray, " H"], ends: Ends) -> Float[np.ndarray, " 
 
 
 def middle(plan: Frames) -> float:
-    """Return the frame around which a motion happens: the mean frame, by squared speed.
+    """Return the mean frame of a motion by squared speed.
 
-    Columns count by their range, so that units do not matter; those that hardly move do not.
+    Columns are divided by their range, so that units do not matter; those that hardly move do not
+    count.
     """
     ranges = np.ptp(plan, axis=0)
     steps = np.diff(plan, axis=0) / np.maximum(ranges, 1e-3 * ranges.max() + 1e-12)
-    energy = np.square(steps).sum(axis=1)
-    if not energy.any():
-        return (len(plan) - 1) / 2
-    return float(((np.arange(len(steps)) + 0.5) * energy).sum() / energy.sum())
+    return mean_frame(np.square(steps).sum(axis=1), first=0.5)
 
 
 def about_vertical(angle: float) -> Float[np.ndarray, "2 2"]:
@@ -339,15 +335,15 @@ def about_vertical(angle: float) -> Float[np.ndarray, "2 2"]:
     return np.array([[cos, -sin], [sin, cos]])
 
 
-def _continuous(
+def _unwrapped(
     vectors: Float[np.ndarray, "H 3"], first: Float[np.ndarray, "3"]
 ) -> Float[np.ndarray, "H 3"]:
-    """The same attitudes as rotation vectors without jumps, beginning near `first`."""
-    out, near = vectors.copy(), first
+    """Unwrap rotation vectors: the same attitudes without jumps, beginning near `first`."""
+    out, previous = vectors.copy(), first
     for frame, vector in enumerate(vectors):
         angle = np.linalg.norm(vector)
         if angle > 1e-9:
-            turns = np.round((near @ vector / angle - angle) / (2 * np.pi))
+            turns = np.round((previous @ vector / angle - angle) / (2 * np.pi))
             out[frame] = vector * (1 + 2 * np.pi * turns / angle)
-        near = out[frame]
+        previous = out[frame]
     return out
