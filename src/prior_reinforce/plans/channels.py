@@ -1,7 +1,7 @@
-"""What a channel is by its name: one table for all that read, judge, align, move and check one.
+"""The kind of a channel by its name: one table for reading, judging, aligning, moving and checking.
 
-A name tells a kind, and the kind the units that its numbers may be in. Some kinds are told by the
-names beside: `x` is a place beside `y`, and an entry of a matrix has eight others.
+The name determines a kind, and the kind the possible units. Some kinds follow from neighbouring
+names: `x` is a place beside `y`, and an entry of a matrix has eight others.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from prior_reinforce.units import base_of, is_rate, per_time
 
 
 class Kind(Enum):
-    """What a channel is; in no unit that its kind cannot have, unless that is stated."""
+    """Kind of a channel; it limits the units, unless one is stated."""
 
     ANGLE = "an angle: joint3, base_yaw, gripper_roll, index_finger_mcp"
     SLIDE = "an axis that turns or slides: a rail, E1, a SCARA's d3"
@@ -32,11 +32,11 @@ class Kind(Enum):
 
     @property
     def is_pose(self) -> bool:
-        """Whether it is a part of where something is, and no joint."""
+        """Whether it is part of a pose, and no joint."""
         return self in (Kind.ROTATION, Kind.QUATERNION, Kind.PLACE)
 
     def usual_unit(self, largest: float) -> str:
-        """Return the unit of its numbers where nobody states one, by the largest of them."""
+        """Return the unit of its numbers if none is stated, by the largest of them."""
         if self in _USUAL:
             return _USUAL[self]
         share = self is Kind.TOOL and largest <= 1
@@ -44,17 +44,17 @@ class Kind(Enum):
 
 
 _USUAL = {Kind.PLACE: "m", Kind.LENGTH: "m", Kind.VELOCITY: "m/s", Kind.TURN_RATE: "rad/s"}
-"""Units of kinds that have the same whatever their numbers."""
+"""Units that do not depend on the numbers."""
 RATES = (Kind.VELOCITY, Kind.TURN_RATE)
 _ANGLES = rf"{CIRCLES}|pitch|theta|phi|psi"
 _INCREMENT = re.compile(
     rf"\b(d(r?[xyz]|{_ANGLES}|angle|pos|rot|joint|grip(per)?)"
     r"|delta(?! \d+$)|incr?|increments?|world vector)\b|^d (?!\d|q\b)"
 )
-"""What an increment is called, in `_words`; `world_vector` is that of RT-1 (Open X-Embodiment), and
+"""Names of increments, in `_words`; `world_vector` is that of RT-1 (Open X-Embodiment), and
 `delta_1` a joint of a delta robot."""
 _LOAD = r"force|torque|wrench|effort|\bloads?\b|\b(f|tau) ext\b"
-"""What a load is called; `O_F_ext_hat_K` and `tau_ext` are libfranka's."""
+"""Names of loads; `O_F_ext_hat_K` and `tau_ext` are libfranka's."""
 _TOOL = (
     r"grip|jaw|finger|width|claw|opening|suction|robotiq|wsg|greifer|pince|夹爪|夹具|vacuum|valve"
     r"|magnet|trigger|\b(pump|pinch|tong)s?\b|drive joint|tool d[io]\b"
@@ -62,11 +62,11 @@ _TOOL = (
 """Words of a gripper or another tool, in `_words`: `drive_joint` is the xArm's gripper."""
 _OF_TOOL = re.compile(rf"{_TOOL}|knuckle|thumb|\bhand( \d+)?$")
 _OF_BASE = r"\b(base|platform|odom(etry)?|rover|agv)\b"
-"""What moves below an arm."""
+"""Names of what carries an arm."""
 _OF_COORDINATE = re.compile(r"(?<!\b[qr] )\bd?[xyz]( \d+| delta)?$|world vector")
 _OF_ATTITUDE = re.compile(rf"{ATTITUDE}|\brot|\bangle")
 _IN_SPACE = rf"\b([dvr]?[xyz]|q[wxyz])\b|{ATTITUDE}|\b(rot\w*|pose) (\w+ )*\d|\bd?({_ANGLES})\b"
-"""What a coordinate or an attitude is called, in `_words`; a tool's one angle is its opening."""
+"""Names of coordinates and attitudes, in `_words`; a tool's one angle is its opening."""
 _OF_POSE = re.compile(rf"{_IN_SPACE}|\brot|\bpose\b|\bd?angle\b")
 
 _TURN = rf"{CIRCLES}|pitch|rotation|angle|winkel"
@@ -77,21 +77,23 @@ _WITHIN = (
     r"|base|basis|waist|torso|shoulder|schulter|elbow|ellbogen|arm|wrist|hand|hip|knee|ankle|neck"
     r"|head|pan|tilt"
 )
-"""Words of angles: that outweigh a gripper's, that stand alone, or within others (`Handgelenk`)."""
+"""Words of angles: those that outweigh a gripper's, that stand alone, or within others
+(`Handgelenk`)."""
 _RAIL = r"rail|track|linear|slider?|gantry|prismatic|carriage"
 _SLIDE = r"(^|\bscara )[de] ?\d|\baxis e \d|(^|\b(?!d*q|tau|theta|ee|elbow)\w+ )[de]\d"
-"""`d3` and `E1`; but `joint_d_3` and Franka's `tau_J_d_3` are what is desired."""
+"""`d3` and `E1`; but `joint_d_3` and Franka's `tau_J_d_3` are desired values."""
 _STRAIGHT = r"[xyz]|lin(ear)?"
 _ALONG = rf"{_STRAIGHT}|{_RAIL}|belt|conveyor|(tcp|eef?)(?!.* [3-5]$)"
-"""What goes at m/s; of six numbered speeds of a tool, `actual_TCP_speed_0` (UR), the last turn."""
+"""Names of what moves at m/s; of a tool's six speeds, `actual_TCP_speed_0` (UR), the last three are
+angular."""
 _OMEGA = r"omega(?! \d+ joint)"
 _SPEED = (
     rf"((?<!(?<!ang)le|\b(?:be|mo|ni|no))(?<!tra|gra|mar|swi|sho)vel(s|o|cmd|ang|{_STRAIGHT})?\b"
     rf"|\bvel(?!vet|cro)|veloc|speed|geschwind|vitesse|速|{_OMEGA}|(?<!d)dot(?=( \d+)?$)"
     rf"|\btwist(?= (ang(ular)?|{_STRAIGHT})\b))"
 )
-"""What a speed is called, `cmdvel` and `xdot` too; `swivel`, `level`, UR's `movel`,
-`wrist_twist` and `omega7_joint1` are none."""
+"""Names of speeds, `cmdvel` and `xdot` too; `swivel`, `level`, UR's `movel`, `wrist_twist` and
+`omega7_joint1` are none."""
 _ACCELERATION = r"accel|\b(ang|lin)?acc\b|ddot\b|jerk|beschleun"
 _POSITION = r"(q ?(pos)?|pos(itions?)?|angles?)\b"
 _NO_POSITION = re.compile(
@@ -101,15 +103,15 @@ _NO_POSITION = re.compile(
     r"|\b(d+ ?q|qd+|q ?dot|dot|temp|tool|ee|eef|rate|inc|incr|diff|rel|err|error|offset|step"
     r"|change|noise|std|var|gain|k ?[pid])\b"
 )
-"""Words of rates, torques, increments and whatever else is no joint position, in `_words`. Ours,
-and broad on purpose: a column that is not taken for a joint's is named, and can be renamed."""
+"""Words of rates, torques, increments and others that are no joint position, in `_words`. Ours, and
+broad on purpose: a column that is not taken for a joint is reported, and can be renamed."""
 _NO_CHANNEL = re.compile(
     r"\b(offset|bias|latency|jitter|(control|sampl\w*|command|update|loop|frame|refresh|recording"
     r"|success) (\w+ )*(rate|freq(uency)?|hz|fps)|fps)\b"
 )
 """Words of what is no part of a motion at all, in `_words`: `q_offset`, `control_rate`."""
 _DERIVED = re.compile(r"(^|[/.:])(d(?!\W?_?\d)|dd+|v|dv|dt)($|[^a-z])", re.IGNORECASE)
-"""What a derivative is called before a joint: `d_joint1`; `q_d` is desired, `d3` slides."""
+"""Prefixes of derivatives: `d_joint1`; `q_d` is desired, `d3` slides."""
 _BY_NAME = (
     (r"\bd ?[xyz]$|torso ?lift", Kind.LENGTH),
     (rf"\bw[xyz]$|{_OMEGA}|\b(dq|qd|d q|q ?dot)\b|\b({_ANGLES}|turn) rate\b", Kind.TURN_RATE),
@@ -121,21 +123,21 @@ _BY_NAME = (
     (r"(rot ?vec|axis ?angle) \d$", Kind.ROTATION),
     (r"rot(ation)? ?6 ?d\d*\b", Kind.MATRIX),
 )
-"""Kinds by what the name says in `_words`, unless it is of a tool; the first counts."""
+"""Kinds by patterns in `_words`, unless the name is of a tool; the first match counts."""
 _BY_WORD = (
     (rf"\b({_ALWAYS})s?\b", Kind.ANGLE),
     (rf"{_TOOL}|{_LOAD}|pressure|voltage|temperature", Kind.TOOL),
     (rf"\b({_RAIL}|ext(ernal)?( ?axis)?)s?\b|{_SLIDE}", Kind.SLIDE),
     (rf"\b({_ALONE})s?\b|{_WITHIN}", Kind.ANGLE),
 )
-"""Kinds by a word in the name; the first counts."""
+"""Kinds by a word in the name; the first match counts."""
 _COORDINATE = re.compile(r"(?P<group>|.*[^a-z0-9])(?P<part>[xyz])([ _-]?ax[ei]s)?", re.IGNORECASE)
 _OF_PLACE = re.compile(
     r"|(.*[^a-z])?(p|pos|positions?|place|trans(lation)?|cart(esian)?|tcp|tool|tip|ee|eef|pose|xyz"
     r"|(end_?)?effector|flange|hand|location|ax[ei]s|base|state|action)[^a-z]*",
     re.IGNORECASE,
 )
-"""What x, y and z are the place of: `tool_x`. Others may be joints: `hip_x`, `hip_y`."""
+"""Names of what has a place x, y and z: `tool_x`. Others may be joints: `hip_x`, `hip_y`."""
 _ENTRY = re.compile(r"(?P<group>.*?)[_\[ ]*(?P<part>[0-4][,_]?[0-4])\]?")
 _POSE = re.compile(
     r"(?P<group>(.*[^a-z])?(pose|(?P<place>(ee|eef|tcp|tool|(end_?)?effector|cartesian)"
@@ -146,13 +148,13 @@ _PARTS_OF_POSE = {
     size: (Kind.PLACE,) * 3 + (attitude,) * (size - 3)
     for size, attitude in ((3, Kind.PLACE), (6, Kind.ROTATION), (7, Kind.QUATERNION))
 }
-"""A whole pose that is numbered, by its size: `actual_TCP_pose_0` to `actual_TCP_pose_5`. Three are
-a place only where they are called so: `eef_pos_0` to `eef_pos_2`."""
+"""Kinds of a numbered pose, by its size: `actual_TCP_pose_0` to `actual_TCP_pose_5`. Three numbers
+are a place only if they are called so: `eef_pos_0` to `eef_pos_2`."""
 _OPENING = (
     r"\b(gripper|jaw|claw|finger)s?"
     r"( ?(width|pos(ition)?|q(pos)?|opening|state|value|joint( \d+)?))*$"
 )
-"""Names of a gripper's opening: the only one, `gripper_width`, is the plan's `gripper`."""
+"""Names of a gripper's opening; the only one in a recording is the plan's `gripper`."""
 _COMMANDED = (
     r"\b(cmd|command(ed)?|actions?|target|des(ired)?|plan(ned)?|ref(erence)?|goal|set(point)?"
     r"|leader|soll"
@@ -162,54 +164,54 @@ _MEASURED = (
     r"\b(act(ual)?|meas(ured)?|real|state|curr(ent)?|present|ist|obs(ervation)?|feedback"
     r"|follower)\b"
 )
-"""Words of what was commanded, and of what was measured."""
+"""Words of commanded, and of measured, values."""
 
 
 def kinds(names: Sequence[str]) -> tuple[Kind, ...]:
-    """Return what each of a recording's channels is."""
-    of_group = {name: Kind.PLACE for name in _grouped(names, _COORDINATE, _are_place)}
-    of_group |= {name: Kind.MATRIX for name in _grouped(names, _ENTRY, _are_matrix)}
+    """Return the kind of each of a recording's channels."""
+    by_group = {name: Kind.PLACE for name in _grouped(names, _COORDINATE, _are_place)}
+    by_group |= {name: Kind.MATRIX for name in _grouped(names, _ENTRY, _are_matrix)}
     poses: dict[tuple[str, str | None], list[str]] = {}
     for name in names:
         if match := _POSE.fullmatch(name.strip()):
             poses.setdefault((match["group"], match["place"]), []).append(name)
     for (group, place), pose in poses.items():  # `joint_pose_0` is none
         if place or (len(pose) > 3 and _by_word(group) is not Kind.ANGLE):
-            of_group |= zip(sorted(pose), _PARTS_OF_POSE.get(len(pose), ()), strict=False)
+            by_group |= zip(sorted(pose), _PARTS_OF_POSE.get(len(pose), ()), strict=False)
     for parts in attitudes(names):
-        of_group |= dict.fromkeys(parts, Kind.QUATERNION if len(parts) == 4 else Kind.ROTATION)
-    found = [of_group.get(name) or _by_word(name) for name in names]
+        by_group |= dict.fromkeys(parts, Kind.QUATERNION if len(parts) == 4 else Kind.ROTATION)
+    found = [by_group.get(name) or _by_word(name) for name in names]
     for i in [*_place_beside_attitude(names, found)]:
         found[i] = Kind.PLACE
-    for name, of in _rates_beside(names).items():
-        i, both = names.index(name), {found[names.index(name)], found[names.index(of)]}
+    for rate, position in _rates_beside(names).items():
+        i, both = names.index(rate), {found[names.index(rate)], found[names.index(position)]}
         if found[i] is not Kind.TOOL:
             found[i] = Kind.VELOCITY if both & {Kind.PLACE, Kind.LENGTH} else Kind.TURN_RATE
     return tuple(found)
 
 
 def _words(name: str) -> str:
-    """Return the words of a name in lower case, blanks between: `joint 1 delta x`, `rail e1`."""
-    apart = re.sub("(?<=[a-z])(?=[A-Z])", " ", re.sub("[Δ∆δ]", " delta ", name))
-    return " ".join(re.findall(r"(?<![^\W\d_])[de]\d+|[^\W\d_]+|\d+", apart.lower()))
+    """Return the words of a name in lower case, with blanks between: `joint 1 delta x`."""
+    split = re.sub("(?<=[a-z])(?=[A-Z])", " ", re.sub("[Δ∆δ]", " delta ", name))
+    return " ".join(re.findall(r"(?<![^\W\d_])[de]\d+|[^\W\d_]+|\d+", split.lower()))
 
 
 def is_increment(name: str) -> bool:
-    """Whether a name says by how much a pose moves on in a frame: `dx`, `joint1_delta`."""
+    """Whether a name is of the change of a pose in a frame: `dx`, `joint1_delta`."""
     return _INCREMENT.search(_words(name)) is not None
 
 
 def increments(names: Sequence[str], units: Sequence[str]) -> tuple[int, ...]:
-    """Return the columns of increments (`PlanFormat.increments`), which no rates are."""
+    """Return the columns of increments (`PlanFormat.increments`); rates are not among them."""
     rates, each = _rates_beside(names), enumerate(zip(names, units, strict=True))
     return tuple(i for i, (n, u) in each if is_increment(n) and n not in rates and not per_time(u))
 
 
 def _rates_beside(names: Sequence[str]) -> dict[str, str]:
-    """Rates called like increments, as exports and states have, and of what: `dx` beside `x`."""
+    """Map rates named like increments, as in exports and states, to positions: `dx` to `x`."""
     own = {name.lower(): name for name in names}
     each = [(name, name.lower().removeprefix(d)) for d in ("d_", "d") for name in names]
-    return {name: own[of] for name, of in each if of in own and of != name.lower()}
+    return {rate: own[stem] for rate, stem in each if stem in own and stem != rate.lower()}
 
 
 def is_of_tool(name: str) -> bool:
@@ -218,38 +220,38 @@ def is_of_tool(name: str) -> bool:
 
 
 def is_tool_state(name: str) -> bool:
-    """Whether a number is right wherever its tool is: `jaw_angle`, `magnet`, but not `jaw_x`."""
+    """Whether a number does not depend on the tool's place: `jaw_angle`, `magnet`, not `jaw_x`."""
     return is_of_tool(name) and not re.search(_IN_SPACE, _words(name))
 
 
 def is_of_finger(name: str) -> bool:
-    """Whether a name is of a gripper's or a hand's own joints: `fr3_finger`, but no `arm_wsg50`."""
+    """Whether a name is of a joint of a gripper or a hand: `fr3_finger`, but not `arm_wsg50`."""
     return re.search(r"\b(finger|gripper|thumb)s?\b", _words(name)) is not None
 
 
 def is_of_base(name: str) -> bool:
-    """Whether a name says where what carries the arm stands, which no joint tells."""
-    called = _words(name)
-    other = re.search(rf"{_SPEED}|{_ACCELERATION}|{_LOAD}|twist|joint", called)
-    is_where = other is None and _by_word(name) is not Kind.TOOL
-    return is_where and re.search(_OF_BASE, called) is not None
+    """Whether a name is of the place of what carries the arm, which no joint determines."""
+    words = _words(name)
+    other = re.search(rf"{_SPEED}|{_ACCELERATION}|{_LOAD}|twist|joint", words)
+    is_place = other is None and _by_word(name) is not Kind.TOOL
+    return is_place and re.search(_OF_BASE, words) is not None
 
 
 def is_of_pose(name: str) -> bool:
-    """Whether a name says anything of a pose: a coordinate, an angle of an attitude, a speed."""
+    """Whether a name is of any part of a pose: a coordinate, an angle of an attitude, a speed."""
     return _OF_POSE.search(_words(name)) is not None
 
 
 def is_coordinate(name: str) -> bool:
-    """Whether a name says a coordinate, or a displacement along one: `tool_dx`, not `angle_x`."""
-    called = _words(name)
-    return bool(_OF_COORDINATE.search(called)) and not _OF_ATTITUDE.search(called)
+    """Whether a name is of a coordinate, or a displacement along one: `tool_dx`, not `angle_x`."""
+    words = _words(name)
+    return bool(_OF_COORDINATE.search(words)) and not _OF_ATTITUDE.search(words)
 
 
 def says_no_position(name: str) -> bool:
-    """Whether a name says that it is a rate, a torque, an increment or else, but no position."""
-    called = f"{_words(name)}; {_words(name.lower())}"
-    return bool(_NO_POSITION.search(called) or _DERIVED.search(name)) or is_increment(name)
+    """Whether a name is of a rate, a torque, an increment or anything else but a position."""
+    words = f"{_words(name)}; {_words(name.lower())}"
+    return bool(_NO_POSITION.search(words) or _DERIVED.search(name)) or is_increment(name)
 
 
 def says_no_channel(name: str) -> bool:
@@ -260,7 +262,7 @@ def says_no_channel(name: str) -> bool:
 def zero_at_rest(names: Sequence[str], units: Sequence[str | None]) -> list[int]:
     """Return the columns that are 0 at rest: increments, and speeds by their unit or their name.
 
-    What is in a unit of angle is no speed, whatever it is called.
+    A column in a unit of angle is no speed, whatever its name.
     """
     known = [unit or "1" for unit in units]
     summed, each = increments(names, known), enumerate(zip(known, kinds(names), strict=True))
@@ -271,9 +273,10 @@ def zero_at_rest(names: Sequence[str], units: Sequence[str | None]) -> list[int]
 def one_for_all(
     unit: str, names: Sequence[str], plan_units: Sequence[str] | None = None
 ) -> list[str | None]:
-    """Return one unit for each channel that can be in it, and None for the others.
+    """Return the unit for each channel that can be in it, and None for the others.
 
-    No gripper and no place is in degrees. Where the plan has channels of that unit's kind, these.
+    No gripper and no place is in degrees. If the plan has channels of the unit's kind, only these
+    get it.
     """
     base = base_of(unit)[0]
     fits = [base_of(own)[0] == base for own in plan_units or (base,) * len(names)]
@@ -288,53 +291,53 @@ def one_for_all(
 def _by_word(name: str) -> Kind:
     if is_increment(name) and is_coordinate(name):
         return Kind.LENGTH
-    called = _words(name)
-    of_tool = re.search(_TOOL, called) and not re.search(_IN_SPACE, called)
+    words = _words(name)
+    of_tool = re.search(_TOOL, words) and not re.search(_IN_SPACE, words)
     table = _BY_WORD if of_tool else (*_BY_NAME, *_BY_WORD)
-    return next((kind for pattern, kind in table if re.search(pattern, called)), Kind.UNKNOWN)
+    return next((kind for pattern, kind in table if re.search(pattern, words)), Kind.UNKNOWN)
 
 
 def _place_beside_attitude(names: Sequence[str], found: Sequence[Kind]) -> Iterator[int]:
-    """Where three names, and not more, next to an attitude say nothing else: `px`, `x_tcp`, `p_0`.
+    """Yield the columns of a place: exactly three unknown names next to an attitude: `px`, `p_0`.
 
-    Beside roll, pitch and yaw, which a wrist's joints are called too, they say x, y, z.
+    Beside roll, pitch and yaw, which may be joints of a wrist, their names must contain x, y, z.
     """
-    sure = attitudes(names)
-    for group in (*sure, *euler_angles(names, ("rad",) * len(names))):
-        at = [names.index(name) for name in group]
-        for beside in (range(min(at))[::-1], range(max(at) + 1, len(names))):
+    certain = attitudes(names)
+    for group in (*certain, *euler_angles(names, ("rad",) * len(names))):
+        columns = [names.index(name) for name in group]
+        for beside in (range(min(columns))[::-1], range(max(columns) + 1, len(names))):
             place = sorted(takewhile(lambda i: found[i] is Kind.UNKNOWN, beside))
-            says = all(letter in names[i].lower() for letter, i in zip("xyz", place, strict=False))
-            if len(place) == 3 and (says or group in sure):
+            is_xyz = all(axis in names[i].lower() for axis, i in zip("xyz", place, strict=False))
+            if len(place) == 3 and (is_xyz or group in certain):
                 yield from place
 
 
 def _grouped(
-    names: Sequence[str], pattern: re.Pattern[str], are: Callable[[str, set[str]], bool]
+    names: Sequence[str], pattern: re.Pattern[str], is_whole: Callable[[str, set[str]], bool]
 ) -> Iterator[str]:
-    """Names that a pattern splits into a group and a part of it, of the groups that `are` so."""
+    """Yield the names that a pattern splits into a group and a part, if the group `is_whole`."""
     matches = {name: match for name in names if (match := pattern.fullmatch(name.strip()))}
     groups: dict[str, set[str]] = {}
     for match in matches.values():
         groups.setdefault(match["group"], set()).add(match["part"].lower())
     for name, match in matches.items():
-        if are(match["group"], groups[match["group"]]):
+        if is_whole(match["group"], groups[match["group"]]):
             yield name
 
 
 def _are_place(group: str, parts: set[str]) -> bool:
-    """Two or three coordinates of a place."""
+    """Whether the parts are two or three coordinates of a place."""
     return len(parts) > 1 and _OF_PLACE.fullmatch(group) is not None
 
 
 def _are_matrix(_: str, parts: set[str]) -> bool:
-    """Three rows and columns or more, of which every entry is there."""
+    """Whether the parts are all entries of a matrix of at least three rows and columns."""
     rows, columns = ({part[k] for part in parts} for k in (0, -1))
     return min(len(rows), len(columns)) >= 3 and len(parts) == len(rows) * len(columns)
 
 
 def is_opening(name: str) -> bool:
-    """Whether a name is of how far a gripper is open: `gripper`, `robot0_gripper_qpos`."""
+    """Whether a name is of a gripper's opening: `gripper`, `robot0_gripper_qpos`."""
     return re.search(_OPENING, _words(name)) is not None
 
 
@@ -348,7 +351,7 @@ def commanded(names: Sequence[str]) -> list[str]:
 
 
 def measured_of(stems: Sequence[str]) -> str | None:
-    """Return the one of several readings of a motion that was measured; None if none says so."""
-    plain = [stem for stem in stems if not re.search(_COMMANDED, _words(stem))]
+    """Return the only measured one of several readings of a motion, by their names, or None."""
+    not_commanded = [stem for stem in stems if not re.search(_COMMANDED, _words(stem))]
     measured = [stem for stem in stems if re.search(_MEASURED, _words(stem))]
-    return next((left[0] for left in (plain, measured) if len(left) == 1), None)
+    return next((found[0] for found in (not_commanded, measured) if len(found) == 1), None)

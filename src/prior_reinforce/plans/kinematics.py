@@ -1,4 +1,4 @@
-"""Kinematics of a serial arm: where the tool tip is, and paths of the flange turned and solved.
+"""Forward and inverse kinematics of a serial arm.
 
 Ours rather than MuJoCo's, which gives the same numbers: this is shorter, takes a whole motion at
 once, and spares `ask` the loading of a physics engine.
@@ -22,42 +22,41 @@ Places = Float[np.ndarray, "*n 3"]
 Pose = tuple[float, float, float, float, float, float]
 """x, y, z in [m] and roll, pitch, yaw in [rad], as in URDF: R = Rz(yaw) Ry(pitch) Rx(roll)."""
 UPRIGHT = math.radians(3.0)
-"""How far an axis may lean and be taken for vertical, [rad]. Ours: it makes a turned motion differ
-by 5 % of a distance, as much as plans are believed to be off by anyway (`offset_sd`)."""
+"""Largest lean of an axis that counts as vertical, [rad]. Ours: a motion turned about it is wrong
+by 5 % of a distance, as much as plans are believed to be off anyway (`offset_sd`)."""
 _Z = (0.0, 0.0, 1.0)
 _HELD = 1e-3
 """A joint that moves less than this in a path is held, [rad] (ours)."""
-_TURN_AT_A_TIME, _NEWTON_STEPS, _LARGEST_STEP, _DAMPING = 0.1, 12, 0.2, 1e-4
-"""Of `turned_path` (ours): [rad], steps for each, [rad] a step, [m^2]."""
+_TURN_STEP, _NEWTON_STEPS, _LARGEST_STEP, _DAMPING = 0.1, 12, 0.2, 1e-4
+"""Settings of `turned_path` (ours): [rad], steps for each, [rad] a step, [m^2]."""
 _SOLVED = 1e-7
 """Error of a pose, [m] and [rad] alike, at which it is solved (ours)."""
-_OFF_PLACE, _OFF_ATTITUDE = 5e-4, 2e-3
-"""By how much a flange may miss its turned path and be in reach, [m] and [rad]. Ours: a thirtieth
-of 1.5 cm, and what turns an object held 25 cm away as far; where a path passes a singular pose, an
-axis that leans by 0.01 rad leaves 0.7 mrad."""
+_PLACE_TOLERANCE, _ATTITUDE_TOLERANCE = 5e-4, 2e-3
+"""Largest error of a flange pose that is in reach, [m] and [rad]. Ours: a thirtieth of 1.5 cm, and
+the angle that moves an object held 25 cm away as far; where a path passes a singular pose, an axis
+that leans by 0.01 rad leaves 0.7 mrad."""
 
 
 @dataclass(frozen=True)
 class Chain:
-    """Revolute joints from the base to the flange, each a pose in the frame before and an axis.
+    """Revolute joints from the base to the flange: each a pose in its parent frame and an axis.
 
-    That is URDF's way to say it, and holds any arm; `craig` and `standard` take the tables of
-    Denavit and Hartenberg.
+    That is URDF's convention, which describes any arm; `craig` and `standard` convert tables of
+    Denavit-Hartenberg parameters.
     """
 
     origins: tuple[Pose, ...]
-    """Pose of each joint's frame in the frame before it."""
+    """Pose of each joint's frame in its parent frame."""
     axes: tuple[tuple[float, float, float], ...]
-    """About which each joint turns, in its own frame; of length 1."""
+    """Axis of each joint in its own frame, of length 1."""
     flange: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     """Pose of the flange in the last joint's frame."""
 
     @classmethod
     def craig(cls, rows: Sequence[tuple[float, float, float]], flange: float) -> Chain:
-        """Make one from rows (a, d, alpha): Rot_x(alpha) Trans_x(a) Rot_z(theta) Trans_z(d).
+        """Convert Craig's rows (a, d, alpha): Rot_x(alpha) Trans_x(a) Rot_z(theta) Trans_z(d).
 
-        They are in [m] and [rad]; the flange is so far from the last joint's frame along its z
-        axis.
+        In [m] and [rad]; `flange` is the distance of the flange along the last joint's z axis.
         """
         origins = tuple(
             (a, -math.sin(alpha) * d, math.cos(alpha) * d, alpha, 0.0, 0.0) for a, d, alpha in rows
@@ -66,10 +65,9 @@ class Chain:
 
     @classmethod
     def standard(cls, rows: Sequence[tuple[float, float, float]], yaw: float = 0.0) -> Chain:
-        """Make one from rows (a, d, alpha): Rot_z(theta) Trans_z(d) Trans_x(a) Rot_x(alpha).
+        """Convert standard rows (a, d, alpha): Rot_z(theta) Trans_z(d) Trans_x(a) Rot_x(alpha).
 
-        They are in [m] and [rad]; the maker's base frame is turned by `yaw` in the one that is
-        wanted.
+        In [m] and [rad]; `yaw` is that of the maker's base frame in the desired base frame.
         """
         poses = tuple((a, 0.0, d, alpha, 0.0, 0.0) for a, d, alpha in rows)
         base = (0.0, 0.0, 0.0, 0.0, 0.0, yaw)
@@ -77,25 +75,25 @@ class Chain:
 
 
 def tool_tip(chain: Chain, joints: JointPositions, tip: Sequence[float] = (0.0,) * 3) -> Places:
-    """Return where a point of the flange's frame, `tip` in [m], is in the base frame."""
-    place = _moved(chain.flange, np.broadcast_to(tip, (*joints.shape[:-1], 3)))
-    # From the flange back to the base, each joint turns the point and its origin moves it.
+    """Return the place of the tool tip in the base frame; `tip` is in the flange's frame, [m]."""
+    place = _in_parent(chain.flange, np.broadcast_to(tip, (*joints.shape[:-1], 3)))
+    # From the flange to the base: each joint turns the point, and its origin moves it.
     for index in reversed(range(len(chain.origins))):
         axis = np.array(chain.axes[index])
         cos, sin = np.cos(joints[..., index, None]), np.sin(joints[..., index, None])
         along = (place @ axis)[..., None] * axis
         turned = along + cos * (place - along) + sin * np.cross(axis, place)
-        place = _moved(chain.origins[index], turned)
+        place = _in_parent(chain.origins[index], turned)
     return place
 
 
 def link_places(chain: Chain, joints: JointPositions) -> Float[np.ndarray, "*n links 3"]:
-    """Return where the base, every joint's frame and the flange are, in the base frame: the arm."""
-    # A joint's frame stands behind those before it as the flange behind all.
-    ends = (*chain.origins, chain.flange)
-    before = [Chain(ends[:n], chain.axes[:n], flange=end) for n, end in enumerate(ends)]
+    """Return the places of the base, every joint's frame and the flange, in the base frame."""
+    # Each frame is the flange of the chain that ends there.
+    poses = (*chain.origins, chain.flange)
+    chains = [Chain(poses[:n], chain.axes[:n], flange=pose) for n, pose in enumerate(poses)]
     base = np.zeros((*joints.shape[:-1], 3))
-    return np.stack([base, *(tool_tip(each, joints) for each in before)], axis=-2)
+    return np.stack([base, *(tool_tip(each, joints) for each in chains)], axis=-2)
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> Float[np.ndarray, "3 3"]:
@@ -112,21 +110,21 @@ def rotation(roll: float, pitch: float, yaw: float) -> Float[np.ndarray, "3 3"]:
     )
 
 
-def _moved(pose: Pose, points: Places) -> Places:
-    """Points of a frame, in the frame that its pose is given in."""
+def _in_parent(pose: Pose, points: Places) -> Places:
+    """Transform points from a frame to its parent frame, in which its pose is given."""
     return np.asarray(points @ rotation(*pose[3:]).T + pose[:3])
 
 
 @dataclass(frozen=True, eq=False)
 class FlangePath:
-    """Poses of the flange along joint paths, and how joints move them."""
+    """Poses of the flange along a joint path, and their Jacobians."""
 
     places: Places
     """(n, 3), base frame, [m]."""
     attitudes: Float[np.ndarray, "*n 3 3"]
-    """Columns are the flange's axes in the base frame."""
+    """Rotation matrices: columns are the flange's axes in the base frame."""
     jacobians: Float[np.ndarray, "*n 6 D"]
-    """Velocity [m/s] over angular velocity [rad/s] for joint speeds [rad/s], base frame."""
+    """Joint speeds [rad/s] to linear [m/s] and angular velocity [rad/s], in the base frame."""
 
 
 def flange_path(chain: Chain, joints: JointPositions) -> FlangePath:
@@ -143,20 +141,20 @@ def flange_path(chain: Chain, joints: JointPositions) -> FlangePath:
         attitude = attitude @ rotations_about(axis, angle)
     place = place + attitude @ np.array(chain.flange[:3])
     attitude = attitude @ rotation(*chain.flange[3:])
-    turning = np.stack(axes, axis=2)
-    moving = np.cross(turning, place[:, :, None] - np.stack(points, axis=2), axis=1)
-    return FlangePath(place, attitude, np.concatenate([moving, turning], axis=1))
+    angular = np.stack(axes, axis=2)
+    linear = np.cross(angular, place[:, :, None] - np.stack(points, axis=2), axis=1)
+    return FlangePath(place, attitude, np.concatenate([linear, angular], axis=1))
 
 
 def first_axis(chain: Chain) -> tuple[Float[np.ndarray, "3"], tuple[float, float]]:
-    """Return the direction of the first joint's axis in the base frame, and where it stands."""
+    """Return the direction of the first joint's axis in the base frame, and its (x, y)."""
     x, y, *_ = chain.origins[0]
     along = flange_path(chain, np.zeros((1, len(chain.axes)))).jacobians[0, 3:, 0]
     return along, (float(x), float(y))
 
 
 def leaning(along: Float[np.ndarray, "3"]) -> float:
-    """Return by how much an axis leans from the vertical, whichever way it points, [rad]."""
+    """Return the angle between an axis and the vertical, whichever way it points, [rad]."""
     return float(np.arctan2(np.hypot(along[0], along[1]), abs(along[2])))
 
 
@@ -165,37 +163,37 @@ def turned_path(
 ) -> JointPositions:
     """Turn the flange's path about a vertical axis and solve for the joints, all frames at once.
 
-    Damped Newton steps of least norm from the path (H, D) that was given, turned a little at a
-    time: so a smooth path stays smooth, and elbows stay where they were. Joints that the path holds
-    stay held as long as six others move. The axis is at `centre`, (x, y) in the base frame; angles
-    are in [rad]. OutOfReachError if a pose of the turned path cannot be reached.
+    Inverse kinematics by damped least squares from the given path (H, D), turned in small steps: a
+    smooth path stays smooth, and elbows stay where they were. Joints that the path holds stay held
+    as long as six others move. The axis is at `centre`, (x, y) in the base frame; angles are in
+    [rad]. OutOfReachError if a pose of the turned path cannot be reached.
     """
     from scipy.spatial.transform import Rotation
 
-    given, about, q = flange_path(chain, joints), np.array([*centre, 0.0]), np.array(joints)
+    given, axis, q = flange_path(chain, joints), np.array([*centre, 0.0]), np.array(joints)
     free = np.ptp(joints, axis=0) > _HELD
     weight = (free if free.sum() >= 6 else np.ones(len(free), dtype=bool)).astype(float)[:, None]
-    off = np.zeros((len(joints), 6))
-    for part in np.linspace(0, angle, math.ceil(abs(angle) / _TURN_AT_A_TIME) + 1)[1:]:
+    error = np.zeros((len(joints), 6))
+    for part in np.linspace(0, angle, math.ceil(abs(angle) / _TURN_STEP) + 1)[1:]:
         turn = rotation(0.0, 0.0, part)
         for _ in range(_NEWTON_STEPS):
-            now = flange_path(chain, q)
-            left = turn @ given.attitudes @ np.swapaxes(now.attitudes, 1, 2)
-            off[:, :3] = (given.places - about) @ turn.T + about - now.places
-            off[:, 3:] = Rotation.from_matrix(left).as_rotvec()
-            if np.abs(off).max() < _SOLVED:
+            path = flange_path(chain, q)
+            rotation_error = turn @ given.attitudes @ np.swapaxes(path.attitudes, 1, 2)
+            error[:, :3] = (given.places - axis) @ turn.T + axis - path.places
+            error[:, 3:] = Rotation.from_matrix(rotation_error).as_rotvec()
+            if np.abs(error).max() < _SOLVED:
                 break
-            back = np.swapaxes(now.jacobians, 1, 2) * weight
-            normal = now.jacobians @ back + _DAMPING * np.eye(6)
-            step = (back @ np.linalg.solve(normal, off[:, :, None]))[:, :, 0]
+            transposed = np.swapaxes(path.jacobians, 1, 2) * weight
+            normal = path.jacobians @ transposed + _DAMPING * np.eye(6)
+            step = (transposed @ np.linalg.solve(normal, error[:, :, None]))[:, :, 0]
             q = q + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
-    allowed = np.repeat([_OFF_PLACE, _OFF_ATTITUDE], 3)
-    worst = int(np.argmax((np.abs(off) / allowed).max(axis=1)))
-    if np.any(np.abs(off[worst]) > allowed):
+    tolerance = np.repeat([_PLACE_TOLERANCE, _ATTITUDE_TOLERANCE], 3)
+    worst = int(np.argmax((np.abs(error) / tolerance).max(axis=1)))
+    if np.any(np.abs(error[worst]) > tolerance):
         raise OutOfReachError(
             f"turned by {angle:.3g} rad about ({centre[0]:g}, {centre[1]:g}) m, "
-            f"frame {worst} is {np.abs(off[worst, :3]).max():.2g} m and "
-            f"{np.abs(off[worst, 3:]).max():.2g} rad away from where the arm comes",
+            f"frame {worst} is {np.abs(error[worst, :3]).max():.2g} m and "
+            f"{np.abs(error[worst, 3:]).max():.2g} rad away from where the arm comes",
             remedy="demonstrate nearer to the goal",
         )
     return q

@@ -1,4 +1,4 @@
-"""Motions: what a plan is, and the demonstrations that are learned from.
+"""Motions: action plans, and the demonstrations that are learned from.
 
 Shapes, units and values are checked once, here; the rest of the package relies on it.
 
@@ -58,11 +58,11 @@ if TYPE_CHECKING:
 
 _FILE_FORMAT = "prior-reinforce demonstrations"
 _FILE_VERSION = 1
-_SAYS_NOTHING: ContextVar[bool] = ContextVar("_SAYS_NOTHING", default=False)
-"""Whether demonstrations are made of others that were warned of; of this thread alone."""
+_WARNED: ContextVar[bool] = ContextVar("_WARNED", default=False)
+"""Whether demonstrations are derived from others, which were warned of; of this thread alone."""
 _ARRAYS = ("plans", "outcomes_seen", "outcome_noise", "outcome_correction")
-"""Of demonstrations, N rows each."""
-_TYPICAL = 0.15
+"""Fields that are arrays of N rows."""
+_TYPICAL_SPREAD = 0.15
 """Standard deviation of goals about a single demonstration, in units of its chart (ours): 15 % of a
 distance, 9 degrees, 15 cm; six demonstrations of our tasks spread as much."""
 _UNSTATED = OutcomeFormat()
@@ -76,7 +76,7 @@ def _say_size(shape: tuple[int, ...], form: PlanFormat) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """One open-loop action plan A with its meaning."""
+    """One open-loop action plan A with its format."""
 
     actions: Frames
     """float64, read-only."""
@@ -111,10 +111,10 @@ class Plan:
         units = dict.fromkeys(self.format.units)
         figure = Figure(figsize=(7, 2.2 * len(units) + 0.6), layout="constrained")
         for axes, unit in zip(figure.subplots(len(units), squeeze=False)[:, 0], units, strict=True):
-            for name, of, column in zip(
+            for name, own_unit, column in zip(
                 self.format.names, self.format.units, self.actions.T, strict=True
             ):
-                if of == unit:
+                if own_unit == unit:
                     axes.plot(self.times, column, label=name.replace("$", r"\$"))
             axes.set_ylabel(f"[{unit}]")
             axes.legend(loc="center left", bbox_to_anchor=(1, 0.5), frameon=False)
@@ -136,19 +136,19 @@ class Demonstrations:
     """r tilde_i, mostly [m] in the table frame, float64, read-only."""
     format: PlanFormat
     outcome_format: OutcomeFormat = _UNSTATED
-    """What the k numbers of an outcome mean; x, y and z in metres where it is not given."""
+    """Names and units of the k numbers of an outcome; x, y and z in metres by default."""
     outcome_noise: Points = field(default_factory=lambda: np.empty((0, 0)))
-    """How uncertain each outcome is, as a standard deviation, shape (N, k); zero where none is
-    given: measured. What is learned is exact at the demonstrations only where they are."""
+    """Standard deviation of each outcome, shape (N, k); zero by default: measured. Learned plans
+    are exact only at demonstrations with measured outcomes."""
     outcome_correction: Points = field(default_factory=lambda: np.empty((0, 0)))
-    """What each outcome is expected to be, minus the one seen, shape (N, k), in the outcomes'
-    units; zero where none is given. "10 cm" by eye is anything from 7.5 to 15, 11.25 on average.
-    Generators learn what was seen, as in the paper; `BayesianAdapter` corrects it."""
+    """Expected outcome minus the one seen, shape (N, k), in the outcomes' units; zero by default.
+    "10 cm" by eye is anything from 7.5 to 15, 11.25 on average. Generators learn what was seen, as
+    in the paper; `BayesianAdapter` corrects it."""
     symmetry: Symmetry | None = None
-    """How a demonstrated motion may be moved, if it may; one demonstration is then enough."""
+    """How a demonstrated motion may be moved, if at all; one demonstration is then enough."""
 
     def __repr__(self) -> str:
-        """Number, size, and what the outcomes are."""
+        """Number, size, and outcome format."""
         size = _say_size(self.plans.shape[1:], self.format)
         return f"Demonstrations({self.n} plans, {size}; outcomes {self.outcome_format})"
 
@@ -156,8 +156,8 @@ class Demonstrations:
         """Copy and check everything; warn of units that look wrong, and of repeated outcomes.
 
         Raises:
-            InvalidDemonstrationsError: None, several whose outcomes lie in a subspace (on one line
-                when k = 2) without a symmetry, shapes that do not fit, values that are not finite.
+            InvalidDemonstrationsError: No plan, several whose outcomes lie in a subspace (on one
+                line when k = 2) without a symmetry, wrong shapes, or values that are not finite.
             ConfigurationError: What the symmetry turns or shifts is not in m and rad.
         """
         if isinstance(self.plans, (list, tuple)):
@@ -205,11 +205,11 @@ class Demonstrations:
         object.__setattr__(self, "outcomes_seen", outcomes)
         object.__setattr__(self, "outcome_format", form)
         if self.symmetry is not None:
-            object.__setattr__(self, "symmetry", self._fitting(self.symmetry))
+            object.__setattr__(self, "symmetry", self._checked(self.symmetry))
         elif len(outcomes) > 1:
             check_spread(outcomes)
-        for oddity in () if _SAYS_NOTHING.get() else self._oddities(unit_stated=stated):
-            warn_caller(oddity)
+        for warning in () if _WARNED.get() else self._warnings(unit_stated=stated):
+            warn_caller(warning)
 
     @property
     def n(self) -> int:
@@ -241,11 +241,11 @@ class Demonstrations:
     def spread(self) -> Point:
         """Standard deviation of each component of the outcomes, in its unit; never zero.
 
-        Where all outcomes agree in a component, or there is one only, it is that of goals about
-        it (`_TYPICAL`).
+        If all outcomes agree in a component, or there is only one, it is the typical spread of
+        goals about them (`_TYPICAL_SPREAD`).
 
         Raises:
-            InvalidDemonstrationsError: That, and there is no symmetry to say it.
+            InvalidDemonstrationsError: They agree, and without a symmetry no spread is known.
         """
         deviation = self.outcomes_seen.std(axis=0)
         alike = deviation <= SAME_OUTCOME * np.maximum(np.abs(self.outcomes_seen).max(axis=0), 1.0)
@@ -258,10 +258,10 @@ class Demonstrations:
             )
         chart = self.symmetry.chart
         jacobian = chart.jacobian(chart.to(self.outcomes_seen)).mean(axis=0)
-        return np.where(alike, _TYPICAL * np.linalg.norm(jacobian, axis=1), deviation)
+        return np.where(alike, _TYPICAL_SPREAD * np.linalg.norm(jacobian, axis=1), deviation)
 
     def without_symmetry(self) -> Self:
-        """Return the same demonstrations for learning from them alone, as in the paper.
+        """Return the same demonstrations without a symmetry, as in the paper.
 
         Raises:
             InvalidDemonstrationsError: There are several, and their outcomes lie in a subspace.
@@ -269,12 +269,12 @@ class Demonstrations:
         return self._derived(symmetry=None)
 
     def with_symmetry(self, symmetry: Symmetry) -> Self:
-        """Return the same demonstrations, which may be moved so."""
+        """Return the same demonstrations with this symmetry."""
         return self._derived(symmetry=symmetry)
 
     @property
     def sha256(self) -> str:
-        """Fingerprint of plans, outcomes, their noise and correction, and what they mean."""
+        """Fingerprint of plans, outcomes, their noise and correction, and formats."""
         form, own = self.outcome_format, asdict(self.format)
         plan = {key: value for key, value in own.items() if value or key == "per_plan"}
         about: list[Any] = [plan, form.names, form.units]
@@ -290,7 +290,7 @@ class Demonstrations:
         return digest.hexdigest()
 
     def with_plans(self, plans: Plans, format: PlanFormat | None = None) -> Self:
-        """Return the same outcomes with other plans; odd units were warned about already."""
+        """Return the same outcomes with other plans; unusual units were warned about already."""
         return self._derived(plans=plans, format=format or self.format)
 
     def only(self, chosen: Sequence[int]) -> Self:
@@ -298,7 +298,7 @@ class Demonstrations:
         return self._derived(**{name: getattr(self, name)[list(chosen)] for name in _ARRAYS})
 
     def repeated_outcomes(self) -> list[tuple[int, int]]:
-        """Return pairs whose outcomes were measured and are the same; by eye they often look it."""
+        """Return pairs whose measured outcomes agree; outcomes read by eye often agree."""
         measured = np.all(self.outcome_noise == 0.0, axis=1)
         scaled = self.outcomes_seen / np.maximum(np.ptp(self.outcomes_seen, axis=0), 1e-12)
         same = np.all(np.abs(scaled[:, None] - scaled[None]) <= SAME_OUTCOME, axis=2)
@@ -322,24 +322,26 @@ class Demonstrations:
     def say_far_outside(self, goal: Point) -> str:
         """Say how far a goal lies outside the outcomes; empty where it is near enough."""
         form, beyond = self.outcome_format, self.far_outside(goal)
+        if not np.any(beyond):
+            return ""
         near = say_place(self.nearest_inside(goal), form)
         where = f"outside what was demonstrated; the nearest inside is {near}"
         if self.symmetry is not None:
             where = f"from where motions can be moved ({self.symmetry.name})"
-        said = f"goal {say_place(goal, form)} lies {say_beyond(beyond, form)} {where}"
-        return f"{said}; check its unit, or demonstrate nearer to it" if np.any(beyond) else ""
+        far = f"goal {say_place(goal, form)} lies {say_beyond(beyond, form)} {where}"
+        return f"{far}; check its unit, or demonstrate nearer to it"
 
     def nearest_inside(self, goal: Point) -> Point:
-        """Return the place nearest to a goal whose components all lie between demonstrated ones."""
+        """Return the nearest place to a goal within the demonstrated range of each component."""
         return np.clip(goal, self.outcomes_seen.min(axis=0), self.outcomes_seen.max(axis=0))
 
     def far_outside(self, goal: Point) -> Point:
-        """How far a goal lies outside the outcomes, in their units; zeros where it is near enough.
+        """Return how far a goal lies outside the outcomes, in their units; zeros if near enough.
 
-        With a symmetry, near enough is what it is believed for (`Symmetry.farthest_from`).
+        With a symmetry, near enough is within `Symmetry.farthest_from`.
 
-        Ours: half the demonstrated extent beyond it is extrapolation that no figure of the paper
-        supports (its displacement field degrades towards the boundary already).
+        Ours: beyond half the demonstrated range, no figure of the paper supports extrapolation (its
+        displacement field degrades towards the boundary already).
         """
         if self.symmetry is not None:
             chart = self.symmetry.chart
@@ -348,13 +350,12 @@ class Demonstrations:
             beyond = aim - np.clip(aim, z.min(axis=0), z.max(axis=0))
             too_far = beyond - np.clip(beyond, -farthest, farthest)
             return np.asarray(np.abs(goal - chart.back(aim - too_far))) * np.any(too_far)
-        low, high = self.outcomes_seen.min(axis=0), self.outcomes_seen.max(axis=0)
-        spread = np.maximum(high - low, 1e-12)
-        beyond = np.maximum(np.maximum(low - goal, goal - high), 0.0)
-        return beyond if np.any(beyond > EXTRAPOLATED * spread) else np.zeros_like(beyond)
+        extent = np.maximum(np.ptp(self.outcomes_seen, axis=0), 1e-12)
+        beyond = np.abs(goal - self.nearest_inside(goal))
+        return beyond if np.any(beyond > EXTRAPOLATED * extent) else np.zeros_like(beyond)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an `.npz`: two arrays and a JSON text; nothing in it can run code."""
+        """Write an `.npz`: arrays and a JSON text; nothing in it can run code."""
         metadata: dict[str, Any] = {
             "file_format": _FILE_FORMAT,
             "version": _FILE_VERSION,
@@ -370,7 +371,7 @@ class Demonstrations:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Self:
-        """Read what `save` wrote; odd units were warned about then.
+        """Read what `save` wrote; unusual units were warned about then.
 
         Raises:
             FileFormatError: The file is missing, truncated, or not such an `.npz`.
@@ -394,12 +395,12 @@ class Demonstrations:
             )
 
     def _derived(self, **changes: Any) -> Self:
-        """The same but for some fields; of its units it was warned already."""
+        """Replace some fields, without repeating the warnings."""
         with _warned_before():
             return replace(self, **changes)
 
-    def _fitting(self, symmetry: Symmetry) -> Symmetry:
-        """The symmetry, held against these demonstrations, its chart around their outcomes."""
+    def _checked(self, symmetry: Symmetry) -> Symmetry:
+        """Check a symmetry against these demonstrations, and centre its chart on their outcomes."""
         if symmetry.k != self.outcome_dim:
             raise InvalidDemonstrationsError(
                 f"the symmetry {symmetry.name!r} moves {symmetry.k} components, but outcomes have "
@@ -415,8 +416,8 @@ class Demonstrations:
         symmetry.check_units(self.outcome_format.units, self.format.units)
         return symmetry.around(self.outcomes_seen)
 
-    def _oddities(self, *, unit_stated: bool) -> Iterator[str]:
-        """What looks like a slip: other units, and an outcome that comes twice."""
+    def _warnings(self, *, unit_stated: bool) -> Iterator[str]:
+        """Yield probable mistakes: other units, and a repeated outcome."""
         metres = np.array([unit == "m" for unit in self.outcome_format.units])
         farthest = np.abs(self.outcomes_seen[:, metres]).max(initial=0.0)
         if looks := looks_like("m", farthest, stated=unit_stated):
@@ -441,9 +442,9 @@ class Demonstrations:
 
 @contextmanager
 def _warned_before() -> Iterator[None]:
-    """Demonstrations made of others say nothing of their units again."""
-    token = _SAYS_NOTHING.set(True)
+    """Make demonstrations from others without repeating their warnings."""
+    token = _WARNED.set(True)
     try:
         yield
     finally:
-        _SAYS_NOTHING.reset(token)
+        _WARNED.reset(token)

@@ -1,4 +1,4 @@
-"""What the numbers of a plan's frames mean: names, units, time step, turns and attitudes."""
+"""The format of a plan's frames: names, units, time step, turns and attitudes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from prior_reinforce.plans.whole_turns import TURN, other_form
 
 @dataclass(frozen=True)
 class PlanFormat:
-    """What the numbers of a frame mean (paper, Table I: "Frame Action Format")."""
+    """Meaning of a frame's numbers (paper, Table I: "Frame Action Format")."""
 
     names: tuple[str, ...]
     """Name of each of the D action dimensions, for instance `joint1`."""
@@ -26,11 +26,11 @@ class PlanFormat:
     dt: float
     """Time between two frames, in [s]."""
     per_plan: tuple[str, ...] = ()
-    """Names of the dimensions that are one number a plan, the same at every frame: when a motion
-    starts, for instance."""
+    """Names of the dimensions that are one number a plan, the same at every frame: the start of a
+    motion, for instance."""
     periodic: tuple[str, ...] = ()
-    """Names of the angles of which a whole turn more is the same pose: of a joint that turns
-    endlessly, of a yaw."""
+    """Names of the angles that repeat after a whole turn: of a joint that turns endlessly, of a
+    yaw."""
     attitudes: tuple[tuple[str, ...], ...] = ()
     """Names of four dimensions that are a unit quaternion, or of three that are a rotation vector;
     each has two forms (`plans.whole_turns`)."""
@@ -56,12 +56,12 @@ class PlanFormat:
         if not is_positive(self.dt):
             raise InvalidPlanError(f"dt must be a positive number of seconds, got {self.dt!r}")
         object.__setattr__(self, "attitudes", tuple(map(tuple, self.attitudes)))
-        said = {
+        named = {
             "per_plan": self.per_plan,
             "periodic": self.periodic,
             "attitudes": tuple(chain.from_iterable(self.attitudes)),
         }
-        for key, given in said.items():
+        for key, given in named.items():
             if unknown := set(given) - set(self.names):
                 raise InvalidPlanError(f"{key} names {sorted(unknown)}, but actions {self.names}")
 
@@ -72,19 +72,19 @@ class PlanFormat:
 
     @property
     def increments(self) -> tuple[int, ...]:
-        """Columns that say by how much a pose moves on until the next frame: `dx`, `joint1_delta`.
+        """Columns that are changes of a pose until the next frame: `dx`, `joint1_delta`.
 
-        What counts of them is their sum. Those of a place and a heading are along the table's axes
-        (`x` and `y` of outcomes); odometry, along a body's own, must be recorded as poses. A rate,
-        as in m/s, is no increment; nor is `d_joint1` beside `joint1` or `dx` beside `x`, which are
-        rates in exports and states.
+        Their sum is the pose. Those of a place and a heading are along the table's axes (`x` and
+        `y` of outcomes); odometry, along a body's own, must be recorded as poses. A rate, as in
+        m/s, is no increment; nor is `d_joint1` beside `joint1` or `dx` beside `x`, which are rates
+        in exports and states.
         """
         return increments(self.names, self.units)
 
     def toward(self, frames: Frames, pose: Point) -> Frames:
-        """Return a motion in the turns and signs in which its first frame is nearest to a pose.
+        """Return the same motion in the whole turns and signs that begin nearest to a pose.
 
-        It is the same motion: only periodic dimensions and attitudes have other numbers.
+        Only the numbers of periodic dimensions and attitudes change.
 
         Args:
             frames: Shape (T, D).
@@ -106,11 +106,11 @@ class PlanFormat:
 def summed(
     frames: Float[np.ndarray, "*N T D"], increments: Sequence[int]
 ) -> Float[np.ndarray, "*N T+1 D"]:
-    """Return the poses of a motion of increments: before each frame, from 0 on, and after the last.
+    """Return the poses of a motion of increments: from 0 before the first frame to after the last.
 
-    Between poses a motion can be sampled anew. Other columns stay beside the pose at which they are
-    commanded, and hold their last value. Frames are of shape (..., T, D), `increments` those
-    columns (`PlanFormat.increments`).
+    Poses can be resampled. Other columns stay with the pose at which they are commanded, and hold
+    their last value. Frames are of shape (..., T, D), `increments` those columns
+    (`PlanFormat.increments`).
     """
     poses, columns = np.concatenate([frames, frames[..., -1:, :]], axis=-2), list(increments)
     poses[..., 0, columns] = 0.0
@@ -121,7 +121,7 @@ def summed(
 def stepped(
     poses: Float[np.ndarray, "*N P D"], increments: Sequence[int]
 ) -> Float[np.ndarray, "*N P-1 D"]:
-    """Return the increments between poses; undoes `summed`."""
+    """Return the increments between poses: the inverse of `summed`."""
     frames, columns = np.array(poses[..., :-1, :]), list(increments)
     frames[..., columns] = np.diff(poses[..., columns], axis=-2)
     return frames

@@ -3,9 +3,9 @@
 A plan is rarely all smooth joint paths. A base is turned and then held, a gripper opens within six
 frames, a valve is on or off. Each kind is timed, coded and interpolated in its own way:
 
-- `held`: one number a plan; what changes within a plan is noise.
+- `held`: one number a plan; changes within a plan are noise.
 - `switch`: takes a few values only, and jumps between them.
-- `step`: rests, but for short transitions: a gripper that opens.
+- `step`: rests except for short transitions: a gripper that opens.
 - `smooth`: everything else.
 
 "At rest" is measured in three ways, because mistakes cost differently:
@@ -47,35 +47,36 @@ ChannelKind = Literal["held", "switch", "step", "smooth"]
 
 HELD = 1e-4
 """A channel is held if it leaves its mean by at most this, rms, in rad or m (in other units: this
-part of the largest range of that unit). Ours: what a plan may be off by and still count as
-reproduced. Of increments their sum counts."""
+part of the largest range of that unit). Ours: the error at which a plan still counts as reproduced.
+Of increments their sum is tested."""
 COUNTS: Mapping[Kind, float] = {"angle": 1e-3, "length": 5e-4}
-"""Range of a few counts of an encoder, and distance from a pose that is none, in [rad] and [m].
-Ours: below what moves a throw by a millimetre."""
+"""Range of a few counts of an encoder, in [rad] and [m]; poses no farther apart are the same. Ours:
+less than moves a throw by a millimetre."""
 NOISE_RMS = 3.0
-"""What is nothing but noise stays within so many sigma, rms. Ours: sigma is estimated from few
-frames, and of a signal that is rounded to counts."""
+"""Pure noise stays within so many sigma, rms. Ours: sigma is estimated from few frames, and from a
+signal that is rounded to counts."""
 _NOISE_PEAK = 5.0
-"""A single frame, or a slope, is off by more than so many sigma for another reason than noise.
-Ours: noise exceeds it in one frame of 1.7 million."""
+"""A single frame or slope that deviates by more than so many sigma is not noise. Ours: noise
+exceeds it in one frame of 1.7 million."""
 _MAX_LEVELS = 4
-"""A channel that takes no more values than these is a switch. Ours: 2 and 8 change no plan of the
-zoo's, whose triggers have two."""
+"""A channel with at most so many values is a switch. Ours: 2 and 8 change no plan of the zoo's,
+whose triggers have two."""
 _STEP_SHARE = 0.25
 """A step's transitions last at most this part of the longest motion of any channel. Ours: a gripper
 opens within six frames of a throw of 40, and joints that move together last about as long as each
 other."""
 _ACTIVE = 0.03
-"""A frame takes part in a transition if it changes by over this part of the channel's largest
-change. Ours: a trembling hand is below; half and double move a gripper by 6e-4 of its range."""
+"""A frame belongs to a transition if it changes by over this part of the channel's largest change.
+Ours: a trembling hand is below; half and double move a gripper by 6e-4 of its range."""
 _STANDS_OUT = 0.25
-"""That noise counts only where it is less than this part of the largest change: a slow joint at
+"""Noise bounds transitions only if it is less than this part of the largest change: a slow joint at
 1 kHz changes by less than its noise from frame to frame. Ours."""
 _FEWEST_FRAMES = 20
-"""Fewer frames show motion, and not its noise. Ours: noise is then read off five differences."""
+"""Noise is not estimated from fewer frames, which show motion. Ours: at 20, from five
+differences."""
 _QUANTILE, _NORMAL = 0.3, 0.385
-"""Noise is read off the 30 % quietest third differences: 0.385 standard deviations of a normal
-variable, in absolute value, lie below its 30 % quantile."""
+"""Noise is estimated from the 30 % quantile of absolute third differences, which is 0.385 standard
+deviations of a normal variable."""
 
 END_STEP = 0.01
 """A channel rests at an end of a plan if its step there is at most this part of its largest step.
@@ -84,27 +85,27 @@ REST_SPEED: Mapping[Kind, float] = {"angle": 0.05, "length": 0.02}
 """A slower channel rests, in recordings and for the gate, in [rad/s] and [m/s]. Ours: the makers
 ask for exactly 0; a smooth start recorded at 30 frames/s shows 0.02 rad/s."""
 _REST_SHARE = 0.05
-"""Part of a channel's largest speed that is rest in units of no `REST_SPEED`. Ours."""
+"""The same in other units, as a part of the channel's largest speed. Ours."""
 _END_TIME = 0.04
 """Time over which the speed at an end is measured, in [s]: a slope through several frames."""
 _TRIM_SHARE = 0.005
 """Frames within this share of the largest range of their unit from an end pose are trimmed. Ours:
 above encoder noise, and reached by a smooth start within its first tenth."""
 _POSE_SHARE = 1e-4
-"""A pose is left where a channel is off by this part of the largest range of its unit. Ours: a
-minimum-jerk motion has 0.7 % of its largest speed there, and can stop."""
+"""A channel leaves a pose by this part of the largest range of its unit. Ours: a minimum-jerk
+motion has 0.7 % of its largest speed there, and can stop."""
 
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """What some motions of D channels are made of; from `analyse`."""
+    """The signals of D channels in some motions; made by `analyse`."""
 
     kinds: tuple[ChannelKind, ...]
     """Kind of each channel, from all motions together."""
     noise: Channels
     """sigma: standard deviation of each channel's noise, in its unit."""
     trim_band: Channels
-    """How far each channel may stray from a recording's end pose in frames that may be dropped."""
+    """How far a frame that may be dropped may be from a recording's end pose, for each channel."""
     pose_band: Channels
     """How far each channel may be from a pose and still count as there."""
     rest_start: tuple[bool, ...]
@@ -116,7 +117,7 @@ class Signals:
 
     @property
     def held(self) -> Bool[np.ndarray, " D"]:
-        """Which channels no motion moves, noise aside."""
+        """Which channels no motion moves, except for noise."""
         return np.array([kind == "held" for kind in self.kinds])
 
     @property
@@ -134,7 +135,7 @@ def analyse(
     """Analyse motions of the same channels, all together: plans, or recordings of any length.
 
     `dt` is the time between two frames, in [s]; of recordings, their median period. `increments`
-    are columns of which the sum counts (`PlanFormat.increments`).
+    are columns that are summed to poses (`PlanFormat.increments`).
     """
     sigma = noise(motions)
     ranges = np.ptp(np.concatenate(list(motions)), axis=0)
@@ -156,10 +157,10 @@ def analyse(
 
 
 def noise(motions: Sequence[Motion] | np.ndarray) -> Channels:
-    """Estimate each channel's measuring noise, as a standard deviation in its unit.
+    """Estimate each channel's measurement noise, as a standard deviation in its unit.
 
-    Third differences of a motion that rests for a third of its time are noise there; of white noise
-    they have 20 times its variance. An upper estimate where nothing rests; zero of less than 20
+    Where a motion rests, for a third of its time, its third differences are noise; those of white
+    noise have 20 times its variance. An upper estimate if nothing rests; zero of less than 20
     frames, which show motion rather than noise.
 
     Source: ours, after the difference-based estimators of Gasser, Sroka and Jennen-Steinmetz
@@ -181,18 +182,18 @@ def without_noise(plans: Float[np.ndarray, "N H D"], held: Bool[np.ndarray, " D"
 def active_runs(
     steps: Sequence[Float[np.ndarray, " _"]], sigma: float
 ) -> list[list[tuple[int, int]]]:
-    """Return the stretches in which one channel changes, of each motion: first frame, and end.
+    """Return the runs of frames in which one channel changes, for each motion: first frame and end.
 
-    `steps` are its absolute changes from frame to frame, in each motion.
+    `steps` are the channel's absolute changes from frame to frame, in each motion.
     """
     peak = max(step.max() for step in steps)
     noisy = _NOISE_PEAK * sigma
-    least = max(_ACTIVE * peak, noisy if noisy < _STANDS_OUT * peak else 0.0)
-    return [_runs(step > least) for step in steps]
+    threshold = max(_ACTIVE * peak, noisy if noisy < _STANDS_OUT * peak else 0.0)
+    return [_runs(step > threshold) for step in steps]
 
 
 def _runs(active: Bool[np.ndarray, " _"]) -> list[tuple[int, int]]:
-    """Begin and end of each stretch of active frames; single quiet frames do not part them."""
+    """Return begin and end of each run of active frames; one quiet frame does not end a run."""
     frames = np.flatnonzero(active)
     if not frames.size:
         return []
@@ -205,20 +206,20 @@ def _runs(active: Bool[np.ndarray, " _"]) -> list[tuple[int, int]]:
 def held_channels(
     motions: Sequence[Motion] | np.ndarray, units: Sequence[str]
 ) -> Bool[np.ndarray, " D"]:
-    """Return which channels keep to their mean in every motion, or leave it by noise only.
+    """Return which channels stay at their mean in every motion, or leave it by noise only.
 
-    Noise differs from one frame to the next by more than it wanders: the sum of squared successive
-    differences is twice the variance's (von Neumann, 1941); a motion's is a hundredth or less. Only
-    angles and lengths are measured by encoders; noise in other units may be meant.
+    Successive values of noise are independent: their mean squared difference is twice the variance
+    (von Neumann, 1941); in a motion it is a hundredth or less. Only angles and lengths are measured
+    by encoders; in other units, what looks like noise may be intended.
     """
     ranges = np.ptp(np.concatenate(list(motions)), axis=0)
     known = np.array([in_unit(COUNTS, unit) is not None for unit in units])
     floor = HELD * np.where(known, 1.0, largest_of_unit(ranges, units))
     counts = np.array([in_unit(COUNTS, unit) or 0.0 for unit in units])
-    live = [_without_repeats(motion) for motion in motions]
-    sigma = np.max([noise([motion]) for motion in live], axis=0)
+    unpadded = [_without_padding(motion) for motion in motions]
+    sigma = np.max([noise([motion]) for motion in unpadded], axis=0)
     held = np.ones(len(units), dtype=bool)
-    for motion, recorded in zip(motions, live, strict=True):
+    for motion, recorded in zip(motions, unpadded, strict=True):
         rms = np.std(recorded, axis=0)
         rough = np.mean(np.diff(recorded, axis=0) ** 2, axis=0) >= rms**2
         small = (np.ptp(recorded, axis=0) <= counts) | (rms <= NOISE_RMS * sigma)
@@ -226,8 +227,8 @@ def held_channels(
     return held
 
 
-def _without_repeats(motion: Motion) -> Motion:
-    """The motion without frames that repeat its last pose, to which plans are padded."""
+def _without_padding(motion: Motion) -> Motion:
+    """Remove the frames that repeat the last pose, by which plans are padded."""
     changes = np.flatnonzero(np.any(np.diff(motion, axis=0) != 0.0, axis=1))
     return motion[: changes[-1] + 2] if changes.size else motion
 
@@ -238,18 +239,21 @@ def _kinds(
     held: Bool[np.ndarray, " D"],
     sigma: Channels,
 ) -> tuple[ChannelKind, ...]:
-    """Tell what kind of signal each channel is, from all motions together."""
-    durations = [
-        [b - a for runs in active_runs([s[:, d] for s in steps], sigma[d]) for a, b in runs]
+    """Classify each channel, from all motions together."""
+    durations = {
+        d: max(
+            (b - a for r in active_runs([s[:, d] for s in steps], sigma[d]) for a, b in r),
+            default=0,
+        )
         for d in np.flatnonzero(~held)
-    ]
-    longest = max((max(each, default=0) for each in durations), default=0)
+    }
+    longest = max(durations.values(), default=0)
     kinds: list[ChannelKind] = ["held"] * len(held)
-    for d, each in zip(np.flatnonzero(~held), durations, strict=True):
+    for d, duration in durations.items():
         if len(np.unique(np.concatenate([motion[:, d] for motion in motions]))) <= _MAX_LEVELS:
             kinds[d] = "switch"
         else:
-            kinds[d] = "step" if max(each, default=0) <= _STEP_SHARE * longest else "smooth"
+            kinds[d] = "step" if duration <= _STEP_SHARE * longest else "smooth"
     return tuple(kinds)
 
 
@@ -258,17 +262,17 @@ def moving_rows(
 ) -> tuple[int, int] | None:
     """Return the first row away from the first pose, and the last one away from the last pose.
 
-    A motion that returns to where it began has rows of both kinds all the same. None if nothing
-    moves. `band` is how far each channel may stray from a pose: `trim_band` or `pose_band`; from 0
-    where its column is one of `rates`, which are 0 at rest.
+    A motion that returns to its first pose has both as well. None if nothing moves. `band` is how
+    far each channel may be from a pose: `trim_band` or `pose_band`. Columns of `rates` are 0 at
+    rest, so their distance from 0 counts.
     """
     first, last = np.array(motion[0]), np.array(motion[-1])
     first[list(rates)] = last[list(rates)] = 0.0
-    left = np.flatnonzero(np.any(np.abs(motion - first) > band, axis=1))
-    ahead = np.flatnonzero(np.any(np.abs(motion - last) > band, axis=1))
-    if not left.size:
+    departed = np.flatnonzero(np.any(np.abs(motion - first) > band, axis=1))
+    unfinished = np.flatnonzero(np.any(np.abs(motion - last) > band, axis=1))
+    if not departed.size:
         return None
-    return int(left[0]), int(ahead[-1] if ahead.size else left[-1])
+    return int(departed[0]), int(unfinished[-1] if unfinished.size else departed[-1])
 
 
 def moving_ends(
@@ -280,19 +284,19 @@ def moving_ends(
 ) -> Bool[np.ndarray, "2 D"]:
     """Return which channels move at the first frames of a recording, and which at the last.
 
-    The speed is the slope of a line through the frames of 40 ms, at least two; of columns that are
-    `rates`, their mean.
+    The speed is the slope of a line through the frames of 40 ms, at least two; for columns that are
+    `rates`, it is their mean.
     """
     is_rate = np.isin(np.arange(len(units)), rates)
     count = max(2, int(np.searchsorted(times, times[0] + _END_TIME, side="right")))
     fastest = np.abs(np.where(is_rate, motion, np.gradient(motion, times, axis=0))).max(axis=0)
     rest = [in_unit(REST_SPEED, u) or _REST_SHARE * f for u, f in zip(units, fastest, strict=True)]
     moving = []
-    for at in (slice(count), slice(-count, None)):
-        t = times[at] - times[at].mean()
+    for end in (slice(count), slice(-count, None)):
+        t = times[end] - times[end].mean()
         total = float(t @ t)
-        mean = motion[at].mean(axis=0)
-        speed = np.abs(np.where(is_rate, mean, t @ (motion[at] - mean) / total))
-        off = np.where(is_rate, 1 / math.sqrt(len(t)), 1 / math.sqrt(total)) * signals.noise
-        moving.append(speed > np.maximum(rest, _NOISE_PEAK * off))
+        mean = motion[end].mean(axis=0)
+        speed = np.abs(np.where(is_rate, mean, t @ (motion[end] - mean) / total))
+        sd = np.where(is_rate, 1 / math.sqrt(len(t)), 1 / math.sqrt(total)) * signals.noise
+        moving.append(speed > np.maximum(rest, _NOISE_PEAK * sd))
     return np.array(moving) & (~signals.held | is_rate)

@@ -1,8 +1,8 @@
-"""Numbers that differ and are one pose: angles a whole turn apart, quaternions of either sign.
+"""Different numbers for the same pose: angles a whole turn apart, quaternions of either sign.
 
-An angle a turn further is the same pose where nothing stops it: of a joint that turns endlessly, of
-a yaw. An attitude has two forms: q and -q as a unit quaternion, and as a rotation vector
-(axis times angle) the same turn the other way round, v - 2 pi v / |v|.
+An angle without stops, of a joint that turns endlessly or a yaw, is the same pose a turn further.
+An attitude has two forms: q and -q as a unit quaternion; v and v - 2 pi v / |v|, the same turn the
+other way round, as a rotation vector (axis times angle).
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ import numpy as np
 TURN: Mapping[str, float] = {"rad": 2 * math.pi, "deg": 360.0}
 """A whole turn by unit."""
 HALF = 0.01
-"""Share of a turn by which a step of half a turn may be more or less. Ours: what a wrist turns in
-one frame."""
+"""Tolerance of a step of half a turn, as a share of a turn. Ours: what a wrist turns in one
+frame."""
 CIRCLES = r"yaw|roll|heading|azimuth?|bearing|gier(winkel)?|roll(winkel)?"
-"""Names of angles that nothing stops."""
+"""Names of angles without stops."""
 _OF_A_LIMB = re.compile(
     r"(shoulder|elbow|(fore|upper_?)arm|wrist|waist|torso|hip|neck|ankle|knee|schulter"
     r"|hand_?gelenk)[^a-z]*(roll|pitch|yaw|rotate)",
     re.IGNORECASE,
 )
-"""Joints of limbs, which have stops and are no Euler angles; `wrist_tcp_roll` and `arm_roll`, of
-what an arm holds, are."""
+"""Joints of limbs, which have stops and are no Euler angles; `wrist_tcp_roll` and `arm_roll`, which
+describe what an arm holds, are Euler angles."""
 _WHOLE_CIRCLE = re.compile(rf"(^|[^a-z])({CIRCLES})($|[^a-z])", re.IGNORECASE)
 _QUATERNION = re.compile(r"(?P<stem>.*?)(?P<part>(?<![a-z])q[._]?[xyzw]|[._ /]?[xyzw])", re.I)
 ATTITUDE = "quat|orient|attitude|euler|axis[ _]?angle"
@@ -38,34 +38,34 @@ _OF_VECTOR = re.compile(r"rot_?vec|axis_?angle", re.IGNORECASE)
 _PATTERNS = ((_QUATERNION, _OF_ATTITUDE, "wxyz"), (_VECTOR, _OF_VECTOR, "xyz"))
 
 _LAST_WORD = re.compile(r"(?P<stem>|.*?[^a-z])(?P<word>r[._]?[xyz]|[a-z]+)")
-"""`tool_yaw`: what it is of, and which angle."""
+"""Splits `tool_yaw` into its stem and the angle's name."""
 
 Frames = TypeVar("Frames", bound=np.ndarray)
 
 
 def whole_circles(names: Sequence[str], units: Sequence[str]) -> tuple[str, ...]:
-    """Return the angles that nothing stops, by their names: yaw, roll, heading."""
+    """Return the angles without stops, by their names: yaw, roll, heading."""
     pairs = zip(names, units, strict=True)
     circles = [n for n, unit in pairs if unit in TURN and _WHOLE_CIRCLE.search(n)]
     return tuple(name for name in circles if not is_of_a_limb(name))
 
 
 def is_of_a_limb(name: str) -> bool:
-    """Return whether an angle is of a limb's joint, which has stops: `left_wrist_roll`."""
+    """Return whether an angle is a limb's joint, which has stops: `left_wrist_roll`."""
     return _OF_A_LIMB.search(name) is not None
 
 
 def attitudes(names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
     """Return the groups of names that are an attitude: `qx, qy, qz, qw`, or `rx, ry, rz`."""
     found = []
-    for pattern, says, letters in _PATTERNS:
+    for pattern, stem_pattern, letters in _PATTERNS:
         groups: dict[str, dict[str, str]] = {}
         for name in names:
             match = pattern.fullmatch(name.strip())
             if match is None:
                 continue
             stem, part = match["stem"], match["part"].strip("._ /")
-            if len(part) > 1 or says.search(stem):
+            if len(part) > 1 or stem_pattern.search(stem):
                 groups.setdefault(stem, {})[part[-1].lower()] = name
         found += [
             tuple(n for n in names if n in group.values())
@@ -77,7 +77,7 @@ def attitudes(names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
 
 
 def other_form(attitude: np.ndarray) -> np.ndarray:
-    """Return the other numbers of the same attitudes (..., 4) or (..., 3)."""
+    """Return the other form of the same attitudes (..., 4) or (..., 3)."""
     if attitude.shape[-1] == 4:
         return -attitude
     angle = np.linalg.norm(attitude, axis=-1, keepdims=True)
@@ -85,17 +85,17 @@ def other_form(attitude: np.ndarray) -> np.ndarray:
 
 
 def euler_angles(names: Sequence[str], units: Sequence[str]) -> tuple[tuple[str, str, str], ...]:
-    """Return the groups of angles that are an attitude: roll, pitch and yaw; a robot's A, B, C.
+    """Return the groups of Euler angles: roll, pitch and yaw; a robot's A, B, C.
 
-    The second of each is the middle turn, whatever the order in which they are recorded.
+    The second of each group is the middle rotation, whatever the order of recording.
     """
     found = []
     for letters in _EULER:
         groups: dict[str, dict[str, str]] = {}
         for name, unit in zip(names, units, strict=True):
             word = _last_word(name)
-            of_angle = unit in TURN and not is_of_a_limb(name)
-            if of_angle and word is not None and word[1] in letters:
+            is_angle = unit in TURN and not is_of_a_limb(name)
+            if is_angle and word is not None and word[1] in letters:
                 groups.setdefault(word[0], {})[word[1]] = name
         for group in groups.values():
             if len(group) == 3:
@@ -105,16 +105,16 @@ def euler_angles(names: Sequence[str], units: Sequence[str]) -> tuple[tuple[str,
 
 
 def other_euler_forms(group: Sequence[str]) -> tuple[EulerForm, ...]:
-    """Return how the other angles of the same attitude may be computed, by the angles' names.
+    """Return the functions that compute the other angles of the same attitude, by the names.
 
-    Two ways where the names do not say whether the first and the last turn are about one axis.
+    Two if the names do not tell whether the first and the last rotation are about the same axis.
     """
     words = tuple(word[1] for word in map(_last_word, group) if word is not None)
     return _EULER.get(words, _EITHER)
 
 
 def _last_word(name: str) -> tuple[str, str] | None:
-    """What an angle is of, and which angle it is: `tool_yaw`, `r.x`."""
+    """Split an angle's name into its stem and its last word: `tool_yaw`, `r.x`."""
     match = _LAST_WORD.fullmatch(name.strip().lower())
     return match and (match["stem"], re.sub("[._]", "", match["word"]))
 
@@ -132,7 +132,7 @@ def other_proper_euler_angles(turn: float, angles: np.ndarray) -> np.ndarray:
 
 
 EulerForm = Callable[[float, np.ndarray], np.ndarray]
-"""From a whole turn and angles (..., 3), the middle turn second, to the other angles."""
+"""Maps a whole turn and angles (..., 3), the middle rotation second, to the other angles."""
 _EITHER = (other_euler_angles, other_proper_euler_angles)
 _EULER: Mapping[tuple[str, ...], tuple[EulerForm, ...]] = {
     ("roll", "pitch", "yaw"): (other_euler_angles,),
@@ -143,5 +143,5 @@ _EULER: Mapping[tuple[str, ...], tuple[EulerForm, ...]] = {
     ("alpha", "beta", "gamma"): _EITHER,
     ("psi", "theta", "phi"): _EITHER,
 }
-"""Names of Euler angles, the middle turn second, and the other angles of the same attitude: of
-Fanuc's W, P, R; Kawasaki's O, A, T; KUKA's A, B, C about three axes, and Doosan's about two."""
+"""Names of Euler angles, the middle rotation second, and their possible conventions: Fanuc's W, P,
+R; Kawasaki's O, A, T; KUKA's A, B, C about three axes, and Doosan's about two."""

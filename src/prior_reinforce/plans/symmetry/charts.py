@@ -1,12 +1,12 @@
-"""Charts of outcomes: coordinates in which a symmetry adds.
+"""Charts of outcomes: coordinates in which a symmetry is an addition.
 
     z = chart.to(r)    r = chart.back(z)
 
 A rotation about an axis adds to the bearing, a factor on the distance to its logarithm, a shift to
 x and y. Components beyond those that a chart names stay as they are (a time of arrival).
 
-    r  outcomes  in their own units, shape (..., k)
-    z  the same  in the chart's units, shape (..., k)
+    r  outcomes       in their own units, shape (..., k)
+    z  coordinates    in the chart's units, shape (..., k)
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _LEAST = 1e-6
 
 
 class Chart(msgspec.Struct, frozen=True):
-    """The interface, and outcomes as they are; members are data, so that they can be saved."""
+    """Interface and identity chart; members are data, so that they can be saved."""
 
     def to(self, outcomes: Outcomes) -> Outcomes:
         """Return z of outcomes."""
@@ -41,11 +41,11 @@ class Chart(msgspec.Struct, frozen=True):
         return np.broadcast_to(np.eye(z.shape[-1]), (*z.shape, z.shape[-1])).copy()
 
     def units(self, units: tuple[str, ...]) -> tuple[str, ...]:
-        """Return the units of z, of outcomes with these units."""
+        """Return the units of z for outcomes in these units."""
         return units
 
     def around(self, outcomes: Points) -> Self:
-        """Return the chart with no jump in the midst of these outcomes."""
+        """Return the chart with its discontinuity away from these outcomes."""
         return self
 
 
@@ -58,7 +58,7 @@ class Polar(Chart, frozen=True, tag="polar"):
     centre: tuple[float, float] = (0.0, 0.0)
     """(x, y) of the axis, in the outcomes' units."""
     ahead: float = 0.0
-    """Bearing in the middle of all, in [rad]: z is within half a turn of it."""
+    """Central bearing, in [rad]: the bearing in z is within half a turn of it."""
 
     def to(self, outcomes: Outcomes) -> Outcomes:
         """See `Chart.to`."""

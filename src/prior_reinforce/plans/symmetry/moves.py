@@ -191,7 +191,7 @@ class Shift(Move, frozen=True, tag="shift"):
 
 
 class TurnJoint(Move, frozen=True, tag="turn-joint"):
-    """Add an angle to one joint at every frame: an upright arm's first joint turns it as a whole."""
+    """Add an angle to one joint at every frame: to the first, which turns an upright arm."""
 
     joint: int = 0
     """Column."""

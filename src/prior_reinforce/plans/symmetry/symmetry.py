@@ -1,10 +1,10 @@
-"""What may be done to a whole motion, and what that does to its outcome.
+"""Symmetries: how a whole motion may be moved, and the prior of what that does to its outcome.
 
-    w = z_aim - z_base                 by how much a plan is moved, in a chart of outcomes
-    z = z_base + G w + ...             where it comes down; G (k, k) is the identity where exact
+    w = z_aim - z_base                 move of a plan, in a chart of outcomes
+    z = z_base + G w + ...             its outcome; G (k, k) is the identity in exact components
 
-`Symmetry` is stated by a task or a workspace, and kept with demonstrations as data. Evidence may
-take it back: every belief about G is a prior.
+`Symmetry` is stated by a task or a workspace, and kept with demonstrations as data. Trials may
+refute it: G is known only by a prior.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ from prior_reinforce.plans.symmetry.moves import (
 from prior_reinforce.units import factor
 
 Matrix = Float[np.ndarray, "k k"]
-_PLAYED = (Tempo, Amplitude, Delay, Learned)
-"""Moves that know no place and no angle: columns may be in any unit."""
+_UNITLESS = (Tempo, Amplitude, Delay, Learned)
+"""Moves without places and angles: columns may be in any unit."""
 EXTRAPOLATED = 0.5
-"""How far beyond the demonstrated range what was learned is believed, as a part of it (ours: see
+"""How far learned components are extrapolated, as a part of the demonstrated range (ours: see
 `Demonstrations.far_outside`)."""
 
 
@@ -57,7 +57,7 @@ class _Data(msgspec.Struct, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, eq=False)
 class Symmetry:
-    """How plans are moved, and what is believed of where they then come down, beforehand.
+    """Moves of plans, and the prior of the moved plans' outcomes.
 
     Standard deviations are in units of the chart. Sources of the priors: module `moves` for p, else
     ours, from reasoning before any figure (5 % of a distance, 0.03 rad from day to day).
@@ -68,23 +68,23 @@ class Symmetry:
     chart: AnyChart
     """Coordinates z of outcomes."""
     moves: tuple[AnyMove, ...]
-    """How a plan is moved along each component of z; in this order."""
+    """Move along each component of z, applied in this order."""
     exact: Bool[np.ndarray, " k"]
-    """Components along which the physics stays the same; others are scalings of unknown law."""
+    """Components along which the physics is invariant; others are scalings of unknown law."""
     gain_mean: Matrix
-    """Of G."""
+    """Prior mean of G."""
     gain_sd: Matrix
-    """Of G; relative to a nominal exponent where a move has one."""
+    """Prior standard deviation of G; relative to the nominal exponent of a move that has one."""
     offset_sd: Point
-    """What is off by the same everywhere: another day, another demonstration."""
+    """Of an offset common to all plans: another day, another demonstration."""
     bend_sd: Point
-    """What the law is off by for each unit of w, since it is no power law."""
+    """Of the deviation from the linear law, for each unit of w, since it is no power law."""
     between_sd: Point
-    """What is off between demonstrations that are mixed."""
+    """Of the deviation between mixed demonstrations."""
     farthest: Point
-    """Largest |w| that is believed."""
+    """Largest |w| at which the prior is trusted."""
     rival: Symmetry | None = None
-    """Another one, which a session takes up where outcomes do not follow this one."""
+    """Another hypothesis, which a session adopts if outcomes do not follow this one."""
 
     def __post_init__(self) -> None:
         """Copy and check; ConfigurationError for sizes that do not fit k, the number of moves."""
@@ -107,26 +107,26 @@ class Symmetry:
 
     @property
     def learned(self) -> Bool[np.ndarray, " k"]:
-        """Components that several demonstrations tell, and that no move changes."""
+        """Components that are learned from several demonstrations, and that no move changes."""
         return np.array([isinstance(move, Learned) for move in self.moves])
 
     @property
     def clocked(self) -> bool:
-        """Whether a clock releases, as its tempo says."""
+        """Whether a clock releases the object, by the tempo's `keep_horizon`."""
         return any(isinstance(move, Tempo) and move.keep_horizon for move in self.moves)
 
     def check_units(self, outcomes: Sequence[str], plans: Sequence[str]) -> None:
-        """Check that what is turned or shifted is in m and rad, as places and angles of moves are.
+        """Check that turned and shifted columns are in m and rad, as places and angles of moves.
 
         Args:
             outcomes: Units of an outcome's components.
             plans: Units of a plan's columns.
 
         Raises:
-            ConfigurationError: One is another length or angle: a turn would give another motion
-                than is meant.
+            ConfigurationError: One is in another unit of length or angle: a turn would give a wrong
+                motion.
         """
-        moved = [c for m in self.moves if not isinstance(m, _PLAYED) for c in m.columns_of()]
+        moved = [c for m in self.moves if not isinstance(m, _UNITLESS) for c in m.columns_of()]
         for unit in (plans[column] for column in moved):
             if any(factor(unit, base) not in (None, 1.0) for base in ("m", "rad")):
                 raise ConfigurationError(
@@ -142,9 +142,9 @@ class Symmetry:
             )
 
     def farthest_from(self, z: Points) -> Point:
-        """How far aims beyond the demonstrated range are believed, in each component.
+        """Return how far beyond the demonstrated range aims are supported, in each component.
 
-        By `farthest` plans are moved; what is learned is extrapolated by half the range.
+        Plans are moved by up to `farthest`; learned components are extrapolated by half the range.
 
         Args:
             z: Demonstrated outcomes in the chart, shape (N, k).
@@ -153,21 +153,21 @@ class Symmetry:
 
     @property
     def increments(self) -> tuple[int, ...]:
-        """Columns of a plan that are 0 at rest, increments and rates, as its moves say."""
+        """Columns of a plan that are 0 at rest: increments and rates of its moves."""
         return tuple(sorted({column for move in self.moves for column in move.increments_of()}))
 
     @property
     def endless(self) -> Symmetry:
-        """The same for joints of any range."""
+        """The same symmetry for joints without limits."""
         return replace(self, moves=tuple(move.endless for move in self.moves))
 
     def speed(self, w: Point) -> float:
-        """Return how much faster a plan that is moved by w (k,) is played."""
-        at = [w[j] / m.exponent for j, m in enumerate(self.moves) if isinstance(m, Tempo)]
-        return float(np.exp(np.sum(at)))
+        """Return the factor by which a plan moved by w (k,) is played faster."""
+        logs = [w[j] / m.exponent for j, m in enumerate(self.moves) if isinstance(m, Tempo)]
+        return float(np.exp(np.sum(logs)))
 
     def move(self, plan: Frames, w: Point) -> Moved:
-        """Return a plan (H, D) moved by w (k,); at w = 0 bit for bit the same.
+        """Return a plan (H, D) moved by w (k,); at w = 0 the same bit for bit.
 
         Raises:
             OutOfReachError: The arm cannot make the moved motion.
@@ -177,18 +177,18 @@ class Symmetry:
         return plan
 
     def toward(self, moved: Moved, near: Frames) -> Moved:
-        """Return a moved plan by those whole turns of turned joints that begin nearest to another.
+        """Return a moved plan by the whole turns of turned joints that begin nearest to `near`.
 
-        So motions of one pose are mixed and compared as such; where joints' ranges are known.
+        So the same motion is mixed and compared as such; for joints whose ranges are known.
         """
         out = np.array(moved)
         columns = [column for move in self.moves for column in move.ranged_of()]
-        apart = (near[0, columns] - moved[0, columns]) / (2 * np.pi)
-        out[:, columns] += 2 * np.pi * np.round(apart)
+        turns = (near[0, columns] - moved[0, columns]) / (2 * np.pi)
+        out[:, columns] += 2 * np.pi * np.round(turns)
         return out
 
     def around(self, outcomes: Points) -> Symmetry:
-        """Return it with a chart that does not jump amid these outcomes; see `Chart.around`."""
+        """Return the symmetry with its chart around these outcomes; see `Chart.around`."""
         return replace(self, chart=self.chart.around(outcomes))
 
     def data(self) -> dict[str, Any]:
@@ -202,7 +202,7 @@ class Symmetry:
 
     @classmethod
     def from_data(cls, data: Mapping[str, Any]) -> Symmetry:
-        """Make it from what `data` gave; runs no code from it.
+        """Rebuild a symmetry from its `data`; runs no code from it.
 
         Raises:
             ConfigurationError: Something is missing, unknown, or of another type.
@@ -253,13 +253,13 @@ def turn_and_scale(
     scale: AnyMove | None = None,
     others: tuple[AnyMove, ...] = (),
 ) -> Symmetry:
-    """Bearing by a turn about a vertical axis, distance by a scaling: tempo, if not said.
+    """Return the symmetry of a turn about a vertical axis and a scaling of distance.
 
     Args:
-        turn: Which is exact: `TurnJoint`, `TurnPoses`, `TurnIncrements` or `TurnPath`.
+        turn: The exact move: `TurnJoint`, `TurnPoses`, `TurnIncrements` or `TurnPath`.
         centre: (x, y) of the axis in the outcomes' frame, [m].
-        scale: `Tempo`, `Amplitude` or `Learned`.
-        others: What moves each further component of the outcome, by a law as unknown as tempo's.
+        scale: `Tempo` (the default), `Amplitude` or `Learned`.
+        others: Move of each further component of the outcome, by a law as unknown as tempo's.
     """
     scale, n = scale or Tempo(), len(others)
     moved = [type(each).__name__.lower() for each in (scale, *others) if type(each) is not Learned]
@@ -270,18 +270,18 @@ def turn_and_scale(
 
 
 def shift(columns: tuple[int, int] = (0, 1), lead: int = 0) -> Symmetry:
-    """Motions that may happen anywhere on the table: x and y of poses, or of increments.
+    """Return the symmetry of motions that may happen anywhere on the table: of poses or increments.
 
     Args:
-        columns: Of x and y.
-        lead: Frames until the shifted start is reached, where columns are increments.
+        columns: Columns of x and y.
+        lead: For increments: frames until the shifted start is reached.
     """
     moves = tuple(Shift(column, lead) for column in columns)
     return _made("shift", Cartesian(), moves, (True, True), (0.15, 0.15), _PLACE, _PLACE)
 
 
 def scale_alone(scale: AnyMove | None = None) -> Symmetry:
-    """One positive outcome, reached by a scaling alone: tempo, if not said."""
+    """Return the symmetry of one positive outcome that a scaling reaches: tempo by default."""
     scale = scale or Tempo()
     name = type(scale).__name__.lower()
     return _made(name, LogDistance(), (scale,), (False,), (_SCALING_SD,), _DISTANCE)
@@ -293,8 +293,8 @@ def _made(
     moves: tuple[AnyMove, ...],
     exact: tuple[bool, ...],
     gain_sd: tuple[float, ...],
-    *believed: Mapping[str, float],
+    *priors: Mapping[str, float],
 ) -> Symmetry:
-    arrays: dict[str, Any] = {k: np.array([each[k] for each in believed]) for k in _DISTANCE}
+    arrays: dict[str, Any] = {k: np.array([each[k] for each in priors]) for k in _DISTANCE}
     mean, sd = np.eye(len(moves)), np.diag(gain_sd)
     return Symmetry(name, chart, moves, np.array(exact), mean, sd, **arrays)
