@@ -9,7 +9,7 @@ from prior_reinforce.adapters.bayesian import BayesianAdapter
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.generators import load_generator, make_generator
 from prior_reinforce.generators.base import Wrapper
-from prior_reinforce.generators.equivariant import Equivariant, rested
+from prior_reinforce.generators.equivariant import Equivariant, padded
 from prior_reinforce.plans.symmetry import (
     Learned,
     Shift,
@@ -102,9 +102,9 @@ def test_a_plan_alone_is_not_padded_and_rests_in_a_batch(throws):
     batch = generator.generate(goals)
     alone = [generator.generate(goal[None])[0] for goal in goals]
     assert len({len(plan) for plan in alone}) > 1
-    for plan, padded in zip(alone, batch, strict=True):
-        np.testing.assert_array_equal(padded[: len(plan)], plan)
-        assert not np.diff(padded[len(plan) - 1 :], axis=0).any()
+    for plan, rested in zip(alone, batch, strict=True):
+        np.testing.assert_array_equal(rested[: len(plan)], plan)
+        assert not np.diff(rested[len(plan) - 1 :], axis=0).any()
     assert generator.generate(np.empty((0, 2))).shape == (0, 140, 3)
 
 
@@ -121,8 +121,8 @@ def test_where_a_clock_releases_one_is_moved_and_between_two_both_are_and_are_mi
 
 def test_increments_rest_at_nothing():
     short, long = np.ones((2, 2)), np.ones((4, 2))
-    padded = rested([short, long], increments=(1,))
-    np.testing.assert_array_equal(padded[0], [[1, 1], [1, 1], [1, 0], [1, 0]])
+    stacked = padded([short, long], increments=(1,))
+    np.testing.assert_array_equal(stacked[0], [[1, 1], [1, 1], [1, 0], [1, 0]])
 
 
 @pytest.mark.parametrize("n", [1, 4])

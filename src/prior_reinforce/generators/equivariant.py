@@ -1,13 +1,13 @@
-"""Wrapper that takes out of plans what a symmetry does, and puts it back after learning.
+"""Wrapper that makes a generator equivariant: it learns canonical plans, and moves them to the aim.
 
-    learn     demonstrations --move to one place--> canonical plans over what is left of z
+    learn     demonstrations --move to one place--> canonical plans over the inexact part of z
     generate  aim --chart--> z --base--> canonical plan --move by w = z - z_base--> plan
 
-What a generator has to learn is one dimension less for each exact component (*canonicalisation*;
-`plans.symmetry`), and nothing at all where no component is left or one demonstration is all there
-is: that demonstration is moved. Beyond the demonstrated hull of what is left, plans are moved from
-its edge; components that are `Learned` the generator extrapolates instead. Without a symmetry the
-wrapped generator learns as it is, unless demonstrations show a turn and it is to be found.
+Each exact component is one dimension less to learn (*canonicalisation*; `plans.symmetry`). Nothing
+is learned if all components are exact, or from a single demonstration, which is moved. Beyond the
+demonstrated hull of the inexact components, plans are moved from its edge; the generator
+extrapolates those that are `Learned`. Without a symmetry the wrapped generator learns the plans
+themselves, unless a turn is to be found and demonstrations show one.
 
 Ours; the idea is that of canonical and frame-averaging policies.
 """
@@ -34,8 +34,8 @@ from prior_reinforce.plans.symmetry.found import find_turn
 class Equivariant(Wrapper):
     """A generator of canonical plans, which the demonstrations' symmetry moves to the aim.
 
-    Plans may differ in length, since slower ones are longer: one that is asked for alone is not
-    padded; in a batch, shorter ones rest at their last frame.
+    Plans may differ in length, since slower ones are longer: a single one is not padded; in a
+    batch, shorter ones rest at their last frame.
     """
 
     name: ClassVar[str] = "equivariant"
@@ -44,25 +44,25 @@ class Equivariant(Wrapper):
     _plans: Plans
     _outcomes: Points
     _noise: Points
-    _home: Point
-    """Exact components to which plans are brought, the others 0, shape (k,)."""
+    _canonical: Point
+    """Exact components z of canonical plans, the others 0, shape (k,)."""
 
     def __init__(self, generator: Generator, *, finds: bool = False) -> None:
         """Wrap a generator of canonical plans; see `Wrapper`.
 
-        With `finds`, a turn is looked for where no symmetry is declared (`plans.symmetry.found`).
+        With `finds`, a turn is searched for if no symmetry is declared (`plans.symmetry.found`).
         """
         super().__init__(generator)
         self._finds = finds
 
     def with_symmetry_used(self, demonstrations: Demonstrations) -> Demonstrations:
-        """Return them with theirs, or that which was found; see `Generator.with_symmetry_used`."""
+        """Return them with the declared or found one; see `Generator.with_symmetry_used`."""
         if self._anchors is None or demonstrations.symmetry is not None:
             return demonstrations
         return demonstrations.with_symmetry(self._anchors.symmetry)
 
     def check_demonstrations(self, demonstrations: Demonstrations) -> None:
-        """Refuse too few to tell what a turn leaves; see `Generator.check_demonstrations`."""
+        """Refuse too few to learn the inexact components; see `Generator.check_demonstrations`."""
         symmetry = demonstrations.symmetry
         if symmetry is None:
             self.generator.check_demonstrations(demonstrations)
@@ -84,31 +84,30 @@ class Equivariant(Wrapper):
         outcomes, noise = demonstrations.outcomes_seen, demonstrations.outcome_noise
         anchors = self._keep(symmetry, demonstrations.plans, outcomes, noise)
         if anchors.mixed:
-            learned = self._canonical(demonstrations, anchors)
-            self.generator.fit(learned, seed=seed, progress=progress)
+            canonical = self._canonicalised(demonstrations, anchors)
+            self.generator.fit(canonical, seed=seed, progress=progress)
             how = "demonstrations are brought to one place, mixed there, and moved to the goal"
         else:
             at_once(progress, loss=0.0)
-            how = "the nearest demonstration is moved to the goal"
-            how = how if demonstrations.n > 1 else "the demonstration is moved to the goal"
-        said = f"symmetry: {symmetry.name}; {how}"
-        self.remarks = (said if declared else _say_found(symmetry, demonstrations.format.names),)
+            how = f"the {'nearest ' * (demonstrations.n > 1)}demonstration is moved to the goal"
+        remark = f"symmetry: {symmetry.name}; {how}"
+        self.remarks = (remark if declared else _say_found(symmetry, demonstrations.format.names),)
 
     def _keep(self, symmetry: Symmetry, plans: Plans, outcomes: Points, noise: Points) -> Anchors:
         anchors = Anchors(symmetry, outcomes, noise)
         self._anchors, self._plans, self._outcomes, self._noise = anchors, plans, outcomes, noise
-        self._home = np.where(symmetry.exact, anchors.z.mean(axis=0), 0.0)
+        self._canonical = np.where(symmetry.exact, anchors.z.mean(axis=0), 0.0)
         return anchors
 
-    def _canonical(self, demonstrations: Demonstrations, anchors: Anchors) -> Demonstrations:
-        """Plans at home, with what is left of their outcomes."""
+    def _canonicalised(self, demonstrations: Demonstrations, anchors: Anchors) -> Demonstrations:
+        """Return canonical plans, with the inexact components of their outcomes."""
         symmetry, left, z = anchors.symmetry, anchors.left, anchors.z
-        to_home = np.where(symmetry.exact, self._home - z, 0.0)
-        move, shown = symmetry.endless.move, demonstrations.plans
-        plans = [move(*each) for each in zip(shown, to_home, strict=True)]
+        w = np.where(symmetry.exact, self._canonical - z, 0.0)
+        move = symmetry.endless.move
+        plans = [move(*each) for each in zip(demonstrations.plans, w, strict=True)]
         plans = [symmetry.toward(plan, plans[0]) for plan in plans]
-        into = np.linalg.inv(symmetry.chart.jacobian(z))
-        correction = np.einsum("nij,nj->ni", into, demonstrations.outcome_correction)
+        dz_dr = np.linalg.inv(symmetry.chart.jacobian(z))
+        correction = np.einsum("nij,nj->ni", dz_dr, demonstrations.outcome_correction)
         names = demonstrations.outcome_format.names
         units = symmetry.chart.units(demonstrations.outcome_format.units)
         return Demonstrations(
@@ -130,40 +129,36 @@ class Equivariant(Wrapper):
             return self._plans[:0]
         if anchors.mixed:
             plans = self.generator.generate(base[:, anchors.left])
-            at = np.where(symmetry.exact, self._home, base)
-            return self._rested([self._to(*each) for each in zip(plans, aims, at, strict=True)])
-        return self._rested([self._picked(*each) for each in zip(aims, weights, strict=True)])
+            z = np.where(symmetry.exact, self._canonical, base)
+            moved = [self._moved(*each) for each in zip(plans, z, aims, strict=True)]
+        else:
+            moved = [self._picked(*each) for each in zip(aims, weights, strict=True)]
+        return padded(moved, symmetry.increments)
 
     def _picked(self, aim: Point, weights: Float[np.ndarray, " N"]) -> Float[np.ndarray, "_ D"]:
-        """The demonstrations that count, each moved to the aim, and mixed."""
+        """Move the demonstrations that have a weight to the aim, and mix them."""
         assert self._anchors is not None
-        count = np.flatnonzero(weights)
-        moved = [self._to(self._plans[i], aim, self._anchors.z[i]) for i in count]
-        moved = [self._anchors.symmetry.toward(plan, moved[0]) for plan in moved]
-        return (
-            moved[0]
-            if len(count) == 1
-            else np.tensordot(weights[count], self._rested(moved), axes=1)
-        )
+        symmetry, used = self._anchors.symmetry, np.flatnonzero(weights)
+        moved = [self._moved(self._plans[i], self._anchors.z[i], aim) for i in used]
+        moved = [symmetry.toward(plan, moved[0]) for plan in moved]
+        if len(used) == 1:
+            return moved[0]
+        return np.tensordot(weights[used], padded(moved, symmetry.increments), axes=1)
 
-    def _to(self, plan: Frames, aim: Point, at: Point) -> Float[np.ndarray, "_ D"]:
-        """A plan that belongs to `at`, moved to the aim.
+    def _moved(self, plan: Frames, z: Point, aim: Point) -> Float[np.ndarray, "_ D"]:
+        """Move a plan with the outcome z to the aim, or as far as the symmetry is trusted.
 
-        What is farther than believed stays there: a tempo of 0.01 would be no plan.
+        A tempo of 0.01 would be no plan.
         """
         assert self._anchors is not None
         symmetry = self._anchors.symmetry
         farthest = np.where(symmetry.exact, np.inf, symmetry.farthest)
-        return symmetry.move(plan, np.clip(aim - at, -farthest, farthest))
-
-    def _rested(self, plans: Sequence[Float[np.ndarray, "_ D"]]) -> Plans:
-        assert self._anchors is not None
-        return rested(plans, self._anchors.symmetry.increments)
+        return symmetry.move(plan, np.clip(aim - z, -farthest, farthest))
 
     def pack(self) -> list[SavedLayer]:
-        """Return what was learned; see `Generator.pack`. A demonstration that is moved is all."""
-        alone = self._anchors is not None and not self._anchors.mixed
-        return Generator.pack(self) if alone else super().pack()
+        """Return the layers; see `Generator.pack`. The wrapped generator has one if it learned."""
+        picked = self._anchors is not None and not self._anchors.mixed
+        return Generator.pack(self) if picked else super().pack()
 
     def state(self) -> tuple[dict[str, Any], Tensors]:
         """The symmetry and the demonstrations; see `Generator.state`."""
@@ -179,7 +174,7 @@ class Equivariant(Wrapper):
     def from_state(
         cls, settings: Mapping[str, Any], tensors: Tensors, generator: Generator | None = None
     ) -> Self:
-        """Rebuild it; where demonstrations are moved as they are, nothing else was learned."""
+        """Rebuild it; if demonstrations themselves are moved, no generator is wrapped."""
         from prior_reinforce.generators.auto import Auto
 
         made = cls(generator or Auto())
@@ -193,7 +188,7 @@ class Equivariant(Wrapper):
 
 
 def _say_found(symmetry: Symmetry, names: Sequence[str]) -> str:
-    """Say what demonstrations show to be turned by the bearing, and how to leave it so."""
+    """Say what turns with the bearing, and how to switch that off."""
     turn = symmetry.moves[1]
     what, axis = "dx and dy turn", "origin"
     if isinstance(turn, TurnJoint):
@@ -204,15 +199,15 @@ def _say_found(symmetry: Symmetry, names: Sequence[str]) -> str:
     )
 
 
-def rested(plans: Sequence[Float[np.ndarray, "_ D"]], increments: Sequence[int] = ()) -> Plans:
+def padded(plans: Sequence[Float[np.ndarray, "_ D"]], increments: Sequence[int] = ()) -> Plans:
     """Stack plans (H_i, D) of different lengths: shorter ones rest at their last frame.
 
     `increments` are columns of differences from frame to frame, which are 0 at rest.
     """
     longest = max(map(len, plans))
-    padded = []
+    stacked = []
     for plan in plans:
         rest = np.repeat(plan[-1:], longest - len(plan), axis=0)
         rest[:, list(increments)] = 0.0
-        padded.append(np.vstack([plan, rest]))
-    return np.stack(padded)
+        stacked.append(np.vstack([plan, rest]))
+    return np.stack(stacked)

@@ -20,7 +20,7 @@ from prior_reinforce.environment import Rollout, Task
 from prior_reinforce.errors import EndpointError, InvalidDemonstrationsError, PerceptionFailedError
 from prior_reinforce.formats import in_tolerances
 from prior_reinforce.generators.base import Generator
-from prior_reinforce.generators.equivariant import rested
+from prior_reinforce.generators.equivariant import padded
 from prior_reinforce.perception.base import Perception
 from prior_reinforce.perception.eye import Eye
 from prior_reinforce.plans.motions import Demonstrations
@@ -285,7 +285,7 @@ def reach_goals(
         if not active:
             break
         trials = ask_all([sessions[i] for i in active])
-        plans = rested([trial.plan for trial in trials])
+        plans = padded([trial.plan for trial in trials])
         executed = _executed(task, plans, np.random.default_rng([seed, 0, number]))
         for i, trial, rollout in zip(active, trials, executed, strict=True):
             goal = goals[i]

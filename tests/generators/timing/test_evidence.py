@@ -6,7 +6,7 @@ import pytest
 from prior_reinforce.generators.interpolation import SmoothInterpolation
 from prior_reinforce.generators.timing import evidence
 from prior_reinforce.generators.timing.evidence import choose_timing, outcome_error
-from prior_reinforce.generators.timing.registration import telling
+from prior_reinforce.generators.timing.registration import even_subset
 from prior_reinforce.generators.timing.timed import Timed
 from prior_reinforce.generators.timing.timeline import decompose
 from prior_reinforce.plans.motions import Demonstrations
@@ -53,7 +53,7 @@ def test_of_many_some_tell_the_timing_by_which_all_are_learned():
     plans = swing[..., None] * rng.uniform(0.5, 1.5, (40, 1, 2))
     form = PlanFormat(("a", "b"), ("rad",) * 2, 0.02)
     many = Demonstrations(plans, plans[:, -1], form)
-    some = many.only(telling(40).tolist())
+    some = many.only(even_subset(40).tolist())
     choice, of_some = choose_timing(many), choose_timing(some)
     assert len(choice.decomposition.numbers) == 40
     # Channels are scaled by all, found from these same ones: from another scale to begin with.

@@ -10,7 +10,7 @@ from prior_reinforce.generators.timing import registration
 from prior_reinforce.generators.timing.registration import (
     best_correlations,
     correlation_lags,
-    telling,
+    even_subset,
 )
 from prior_reinforce.generators.timing.timeline import decompose
 from prior_reinforce.plans.motions import Demonstrations
@@ -192,7 +192,7 @@ def test_some_of_the_demonstrations_start_as_they_do_among_all():
 
 
 def test_of_many_demonstrations_some_tell_how_to_learn_from_all():
-    assert telling(24).tolist() == list(range(24))
-    some = telling(200)
+    assert even_subset(24).tolist() == list(range(24))
+    some = even_subset(200)
     assert len(some) == len(set(some.tolist())) == 24
     assert (some[0], some[-1]) == (0, 199)

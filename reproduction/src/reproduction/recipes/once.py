@@ -28,7 +28,7 @@ import numpy as np
 
 from prior_reinforce.arrays import Points
 from prior_reinforce.environment import Task
-from prior_reinforce.generators.equivariant import rested
+from prior_reinforce.generators.equivariant import padded
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.symmetry import Symmetry, TurnJoint, turn_and_scale
 from prior_reinforce.simulation.tasks import make_task
@@ -115,7 +115,7 @@ def augmented(shown: Demonstrations, symmetry: Symmetry, region: np.ndarray) -> 
         into = symmetry.chart.jacobian(z) @ symmetry.gain_sd
         noise.append(np.sqrt(np.square(into * (z - of)[:, None, :]).sum(axis=2)))
     return Demonstrations(
-        rested(plans),
+        padded(plans),
         np.tile(places, (shown.n, 1)),
         shown.format,
         shown.outcome_format,

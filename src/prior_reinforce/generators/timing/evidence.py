@@ -1,12 +1,12 @@
-"""Which timing demonstrations call for: the one in which the motion best predicts the outcome.
+"""Choose the timing in which the motion best predicts the outcome, by leave-one-out errors.
 
 A weighted mean of plans has the weighted mean of their outcomes only if the outcome is an affine
 function of the motion. So each demonstration is left out, and its outcome predicted from the others
 by an affine function of the state at one phase: the decisive one, such as a release, which is
-unknown and taken where the prediction is best. A release by the clock is predicted best from plans
-as recorded; one that the motion itself brings about, from plans that start together.
+unknown and chosen as the best predicting. A release by the clock is predicted best from plans as
+recorded; one that the motion itself causes, from plans that start together.
 
-A start that is learned separately is the rule; other timings have to do clearly better, since six
+By default starts are learned separately; other timings have to predict clearly better, since six
 demonstrations are little evidence.
 
 Notation:
@@ -23,20 +23,20 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.errors import InvalidDemonstrationsError
-from prior_reinforce.generators.timing.registration import WarpKind, telling
+from prior_reinforce.generators.timing.registration import WarpKind, even_subset
 from prior_reinforce.generators.timing.timeline import Decomposition, decompose
 from prior_reinforce.plans.motions import Demonstrations
 
 _MAX_RELATIVE_ERROR: dict[WarpKind, float] = {"none": 0.9, "start": 1.0, "tempo": 0.5}
-"""A timing's error must be below this part of `start`'s to be taken instead. Ours, chosen on the
-zoo's development tasks (reproduction/docs/decisions-generator.md)."""
+"""A timing is chosen instead of `start` if its error is below this part of the error of `start`.
+Ours, chosen on the zoo's development tasks (reproduction/docs/decisions-generator.md)."""
 _CLOCK_SPREAD = 0.08
-"""People who keep to a clock start within this part of their motion's length of each other,
-standard deviation; where they do not, `none` is out of the question. Ours: 0.01 to 0.07 on
-zoo-lob, which a clock releases; 0.17 to 0.29 on our own tasks, whose people start as they like."""
+"""Largest standard deviation of starts, as a part of the motion's length, of people who keep to a
+clock; above it, `none` is excluded. Ours: 0.01 to 0.07 on zoo-lob, which a clock releases; 0.17 to
+0.29 on our own tasks, whose people start as they like."""
 _CLOCK_ERROR = 0.35
-"""A clock is looked for only where `start` misses outcomes by more than this. Ours: of the zoo's
-development sets that seemed clocked, it is less in 12 of 19 that are not, in 1 of 15 that are."""
+"""A clock is considered only if the error of `start` is larger. Ours: of the zoo's development sets
+that seemed clocked, it is less in 12 of 19 that are not, in 1 of 15 that are."""
 _MAX_USEFUL_ERROR = 0.7
 """Above this error the model is no better than predicting the mean outcome, whose error is 1. Ours:
 half and double change plans of 5 and 1 of 113 sets, and first throws by 0.005 at most."""
@@ -44,20 +44,20 @@ _FEWEST = 5
 """With fewer demonstrations than this, or than k + 3, none can be left out. Ours: of three sets of
 4 with one outcome, one would have its tempos learned, by chance."""
 _FLIGHT = 0.1
-"""Velocities count as much as the way made in this time, in [s]. Ours: a thrown object flies for a
-few times as long."""
+"""Velocities are multiplied by this time, in [s]. Ours: a thrown object flies for a few times as
+long."""
 _INSTANT = 0.04
-"""A state is a mean over this time before and after, in [s]. Ours: an object takes about so long to
-leave a hand."""
+"""A state is a mean over this time before and after, in [s]. Ours: about the time in which an
+object leaves a hand."""
 _BEST = 3
-"""Of all phases the best so many are averaged, to reduce selection bias. Ours: with 2 and
-6, plans of 2 and 3 of 113 sets differ, and first throws by 0.01."""
+"""The best so many phases are averaged, to reduce selection bias. Ours: with 2 and 6, plans of 2
+and 3 of 113 sets differ, and first throws by 0.01."""
 _RIDGE = 1e-3
-"""Ridge of the affine function, relative to the states' mean square. Ours: below what motions
-differ by, above rounding; half and double change plans of 1 and 3 of 113 sets."""
+"""Ridge of the affine function, relative to the states' mean square. Ours: below the differences of
+motions, above rounding; half and double change plans of 1 and 3 of 113 sets."""
 _EQUALLY_GOOD = 0.1
-"""Errors that differ by less than this part of the outcomes' spread are said to be as good as each
-other; it decides a remark only. Ours: with six demonstrations they are not known better."""
+"""Errors that differ by less than this part of the outcomes' spread are reported as equal; it
+decides a remark only. Ours: six demonstrations do not determine them better."""
 TOO_FEW_FRAMES = "timing: as recorded, since {} frames are too few to be moved without a loss"
 """A remark."""
 _WORDS: dict[WarpKind, str] = {
@@ -69,19 +69,19 @@ _WORDS: dict[WarpKind, str] = {
 
 @dataclass(frozen=True, eq=False)
 class TimingChoice:
-    """The timing that was taken, and why."""
+    """The chosen timing, and the reason."""
 
     decomposition: Decomposition
     reason: str
     """In one sentence, for people."""
     errors: Mapping[WarpKind, float] = field(default_factory=dict)
-    """`outcome_error` of each timing that was compared; empty where none could be."""
+    """`outcome_error` of each compared timing; empty if none could be compared."""
 
 
 def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
-    """Take the timing in which the motion best predicts left-out outcomes.
+    """Choose the timing in which the motion best predicts left-out outcomes.
 
-    With few demonstrations, starts are learned separately, as a rule.
+    With few demonstrations, starts are learned separately.
     """
     n = demonstrations.n
     try:
@@ -96,22 +96,22 @@ def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
             f"timing: {_WORDS[usual.timeline.kind]}, as a rule; {n} demonstrations cannot tell "
             "what is better",
         )
-    some = tuple(telling(n).tolist())
-    # All of them are asked for without naming them, as elsewhere, so that the answer is kept once.
-    fewer = (some,) if len(some) < n else ()
-    told = demonstrations.only(some) if fewer else demonstrations
+    numbers = tuple(even_subset(n).tolist())
+    # All are passed as no subset, as elsewhere, so that `decompose` caches them once.
+    subset = (numbers,) if len(numbers) < n else ()
+    compared = demonstrations.only(numbers) if subset else demonstrations
     decompositions: dict[WarpKind, Decomposition] = {
-        kind: decompose(demonstrations, kind, *fewer) for kind in _MAX_RELATIVE_ERROR
+        kind: decompose(demonstrations, kind, *subset) for kind in _MAX_RELATIVE_ERROR
     }
-    errors = {kind: outcome_error(told, each) for kind, each in decompositions.items()}
-    able = [kind for kind in errors if kind == "start" or errors[kind] < _MAX_USEFUL_ERROR]
+    errors = {kind: outcome_error(compared, each) for kind, each in decompositions.items()}
+    candidates = [kind for kind in errors if kind == "start" or errors[kind] < _MAX_USEFUL_ERROR]
     usual = decompositions["start"]
-    length = float(np.median(np.ptp(told.signals.spans, axis=1)))
+    length = float(np.median(np.ptp(compared.signals.spans, axis=1)))
     no_clock = float(np.std(usual.numbers[:, 0])) > _CLOCK_SPREAD * length
     # A hand that opens within the plan needs no clock.
     if no_clock or errors["start"] <= _CLOCK_ERROR or usual.by_step:
-        able = [kind for kind in able if kind != "none"]
-    best = min(able, key=lambda kind: errors[kind] / _MAX_RELATIVE_ERROR[kind])
+        candidates = [kind for kind in candidates if kind != "none"]
+    best = min(candidates, key=lambda kind: errors[kind] / _MAX_RELATIVE_ERROR[kind])
     if errors[best] >= _MAX_USEFUL_ERROR:
         why = ", as a rule; these demonstrations do not tell what is better"
     elif min(e for kind, e in errors.items() if kind != best) - errors[best] < _EQUALLY_GOOD:
@@ -119,39 +119,35 @@ def choose_timing(demonstrations: Demonstrations) -> TimingChoice:
         why = ", as a rule" if better else "; other timings would do equally well here"
     else:
         why = ", as these demonstrations ask for"
-    taken = decompositions[best] if told is demonstrations else decompose(demonstrations, best)
-    return TimingChoice(
-        taken,
-        f"timing: {_WORDS[taken.timeline.kind]} ({best}){why}",
-        errors,
-    )
+    chosen = decompose(demonstrations, best) if subset else decompositions[best]
+    return TimingChoice(chosen, f"timing: {_WORDS[chosen.timeline.kind]} ({best}){why}", errors)
 
 
 def outcome_error(demonstrations: Demonstrations, decomposition: Decomposition) -> float:
-    """Return how far left-out outcomes are missed, relative to their spread.
+    """Return the leave-one-out error of predicted outcomes, relative to their spread.
 
-    The root mean square at the decisive phase; 1 is what the mean of the others would do.
+    The root mean square at the decisive phase; predicting the mean of the others would give 1.
     """
     states = _states(demonstrations, decomposition)
     outcomes = demonstrations.outcomes_seen / demonstrations.outcomes_seen.std(axis=0)
     n = demonstrations.n
-    counts = n / (n - 1)  # the others' mean is as much farther than the mean of all
+    factor = n / (n - 1)  # distance to the mean of the others, relative to the mean of all
     x, r = states - states.mean(axis=1, keepdims=True), outcomes - outcomes.mean(axis=0)
-    # Ridge regression leaves each out in closed form, also with a ridge of its own for each.
-    u, sizes, _ = np.linalg.svd(x, full_matrices=False)
-    own = np.sum(x**2, axis=2)
-    ridge = _RIDGE * (own.sum(axis=1, keepdims=True) - counts * own) / (n - 1) + 1e-12
-    fitted = u * (sizes**2)[:, None] / ((sizes**2)[:, None] + ridge[:, :, None])
+    # Ridge regression has closed-form leave-one-out errors, even with a ridge for each.
+    u, singular, _ = np.linalg.svd(x, full_matrices=False)
+    squares = np.sum(x**2, axis=2)
+    ridge = _RIDGE * (squares.sum(axis=1, keepdims=True) - factor * squares) / (n - 1) + 1e-12
+    fitted = u * (singular**2)[:, None] / ((singular**2)[:, None] + ridge[:, :, None])
     leverage = np.sum(fitted * u, axis=2, keepdims=True)
-    missed = counts * (fitted @ (np.swapaxes(u, 1, 2) @ r) - r) / (1.0 - counts * leverage)
-    errors = np.sqrt(np.mean(missed**2, axis=(1, 2)))
+    residuals = factor * (fitted @ (np.swapaxes(u, 1, 2) @ r) - r) / (1.0 - factor * leverage)
+    errors = np.sqrt(np.mean(residuals**2, axis=(1, 2)))
     return float(np.mean(np.sort(errors)[:_BEST]))
 
 
 def _states(
     demonstrations: Demonstrations, decomposition: Decomposition
 ) -> Float[np.ndarray, "T N F"]:
-    """What the arm does at each phase: positions and velocities, of all units alike."""
+    """Return the arm's state at each phase: positions and velocities, scaled by unit."""
     from scipy.ndimage import uniform_filter1d
 
     plan_format = demonstrations.format

@@ -1,14 +1,15 @@
-"""A symmetry from words: what a person knows of a task, and what its plans are.
+"""Declare a symmetry by what a person knows of a task, and by the format of its plans.
 
 - *The arm carries the object until it leaves*: turns about the base (`about="base"`).
 - *It pushes or strikes an object that lies at (x, y)*: turns about that place (`about=(x, y)`).
 - *The motion may happen anywhere on the table*: shifts (`distance="shift"`), of poses alone.
 - *Neither*: `about=None`; one outcome is then reached by tempo or amplitude.
-- *Only a turn is known* (`distance="learned"`): several demonstrations tell all but the bearing.
+- *Only a turn is known* (`distance="learned"`): all but the bearing is learned from several
+  demonstrations.
 
-What a plan is, its names and units say: joints of a known arm, poses (x and y in m, with rx, ry and
-rz, or qw, qx, qy and qz, or yaw), or increments of them (dx, dy, dyaw) along the table's axes:
-odometry, whose increments are along the robot's own, must be recorded as poses.
+The names and units of plans distinguish joints of a known arm, poses (x and y in m, with rx, ry and
+rz, or qw, qx, qy and qz, or yaw), and increments of poses (dx, dy, dyaw) along the table's axes.
+Odometry, whose increments are along the robot's own axes, must be recorded as poses.
 """
 
 from __future__ import annotations
@@ -45,10 +46,10 @@ About = Literal["base"] | tuple[float, float] | None
 Distance = Literal["tempo", "amplitude", "learned", "shift"]
 _VECTOR, _QUATERNION = ("rx", "ry", "rz"), ("qw", "qx", "qy", "qz")
 _ON_AXIS = 1e-3
-"""How far from the first joint's axis a place may be and be on it, [m]. Ours: half a turn about the
-one or the other then differs by 2 mm."""
+"""Largest distance of a place on the first joint's axis, [m]. Ours: half a turn about the one or
+the other then differs by 2 mm."""
 _LEAD = 8
-"""Frames within which a hand that is told increments is brought to its moved start (ours)."""
+"""Frames of increments that lead the hand to its moved start (ours)."""
 
 
 def declare_symmetry(
@@ -66,32 +67,32 @@ def declare_symmetry(
     stays: Sequence[str] = (),
     exponent: float = NOMINAL_EXPONENT,
 ) -> Symmetry:
-    """Make the symmetry of a task from what is said of it.
+    """Make the declared symmetry of a task.
 
     Args:
         form: Of its plans.
-        k: Components of its outcomes; x and y first where there are several.
-        about: About what the motion may be turned.
-        distance: How it is made to reach farther; `learned`: several demonstrations tell, and so
-            with every further component of the outcome.
-        chain: The arm, where plans are of its joints; its base frame is the outcomes'.
+        k: Components of its outcomes; x and y first if there are several.
+        about: The axis about which the motion may be turned.
+        distance: The scaling by which it reaches farther; `learned`: from several demonstrations,
+            as then every further component of the outcome.
+        chain: The arm, for plans of its joints; its base frame is the outcomes'.
         joints: Columns of the chain's joints, in its order.
-        ranges: Their ends, [rad]; turned plans go the other way round where that fits alone.
+        ranges: Their limits, [rad]; turned plans go the other way round if only that fits.
         start: (x, y) of the hand before increments, [m].
-        release_frame: Where a clock lets go, and not the motion.
-        steps: Names of grippers and triggers: neither turned nor made larger, and played along
-            lines.
-        stays: Names of what a turn or a shift leaves as it is, but tempo and amplitude scale.
+        release_frame: Frame of the release, if a clock releases and not the motion.
+        steps: Names of grippers and triggers: neither turned nor enlarged, and interpolated
+            linearly.
+        stays: Names of columns that a turn or a shift leaves alone, but tempo and amplitude scale.
         exponent: p of distance ~ speed^p: 1 for a level throw from a height, whose fall takes the
             same time at any speed; 2 for a throw upwards and a slide; less by the share of the
             distance that the object is carried.
 
     Raises:
-        ConfigurationError: Plans or outcomes are not such that this can be done.
+        ConfigurationError: Plans or outcomes do not permit it.
     """
     column = {name: index for index, name in enumerate(form.names)}
-    for key, said in (("steps", steps), ("stays", stays)):
-        if unknown := sorted(set(said) - set(column)):
+    for key, named in (("steps", steps), ("stays", stays)):
+        if unknown := sorted(set(named) - set(column)):
             raise ConfigurationError(
                 f"{key} names {unknown}, but plans have {', '.join(form.names)}"
             )
@@ -195,7 +196,7 @@ def declare_symmetry(
 
 
 def _centre(about: object) -> tuple[float, float]:
-    """The place that a motion is turned about, [m]; ConfigurationError if it is none."""
+    """Return the place about which a motion is turned, [m]; ConfigurationError if it is none."""
     if about == "base":
         return 0.0, 0.0
     place = np.empty(0)
@@ -210,13 +211,13 @@ def _centre(about: object) -> tuple[float, float]:
 
 
 def _columns(column: dict[str, int], names: Sequence[str]) -> Columns:
-    """Those of these names; none of x and y, or of an attitude, unless all are there."""
-    found = tuple(column[name] for name in names if name in column)
+    """Return the columns of these names if all of them exist, else none."""
+    found = _named(column, names)
     return found if len(found) == len(names) else ()
 
 
 def _named(column: dict[str, int], names: Sequence[str]) -> Columns:
-    """Those of these names."""
+    """Return the columns of those of these names that exist."""
     return tuple(column[name] for name in names if name in column)
 
 
@@ -227,14 +228,14 @@ def _refuse_left_behind(
     stays: Collection[str],
     among: Iterable[int] | None = None,
 ) -> None:
-    """Refuse columns that a move would leave as they are, unless they are openings or are named.
+    """Refuse columns that a move would not change, unless they are openings or are named.
 
     A second place, a heading of another name or a velocity turns with the motion.
     """
-    every = range(form.action_dim) if among is None else among
+    candidates = range(form.action_dim) if among is None else among
     left = [
         name
-        for name in (form.names[i] for i in every if i not in known)
+        for name in (form.names[i] for i in candidates if i not in known)
         if name not in stays and not _stays(form, name)
     ]
     if left:
@@ -246,16 +247,16 @@ def _refuse_left_behind(
 
 
 def _stays(form: PlanFormat, name: str) -> bool:
-    """Whether a column is a tool's opening, or one number a plan, and so is right in any place."""
+    """Whether a column is valid in any place: a tool's opening, or one number a plan."""
     return is_tool_state(name) or (name in form.per_plan and not is_of_pose(name))
 
 
 def _places(form: PlanFormat) -> list[int]:
-    """Columns of a length, or whose name says a coordinate, as units may have been guessed."""
+    """Return the columns of a length, or named as a coordinate, as units may have been guessed."""
     turned = (*form.attitudes, *attitudes(form.names), *euler_angles(form.names, form.units))
-    said = {n for n in form.names if is_coordinate(n)}.difference(*turned)
+    coords = {n for n in form.names if is_coordinate(n)}.difference(*turned)
     each = enumerate(zip(form.names, form.units, strict=True))
-    return [i for i, (n, u) in each if kind_of(u) == "length" or (n in said and not is_force(u))]
+    return [i for i, (n, u) in each if kind_of(u) == "length" or (n in coords and not is_force(u))]
 
 
 def _refuse_rates(form: PlanFormat, moved: Iterable[int], rates: Collection[int]) -> None:
@@ -269,7 +270,7 @@ def _refuse_rates(form: PlanFormat, moved: Iterable[int], rates: Collection[int]
 
 
 def _refuse_unplayable(form: PlanFormat, distance: Distance, steps: Sequence[str]) -> None:
-    """Refuse columns that are not right in a motion that is played faster or made larger."""
+    """Refuse columns that would be wrong in a motion that is played faster or enlarged."""
     if distance not in ("tempo", "amplitude"):
         return
     each = [*zip(form.names, form.units, strict=True)]
@@ -288,9 +289,9 @@ def _refuse_unplayable(form: PlanFormat, distance: Distance, steps: Sequence[str
 
 
 def _first_joint(chain: Chain) -> tuple[float, tuple[float, float]]:
-    """Which way the first joint counts, 1 or -1, and where its axis stands.
+    """Return the sense of the first joint, 1 or -1, and (x, y) of its axis.
 
-    ConfigurationError if it is not vertical.
+    ConfigurationError if the axis is not vertical.
     """
     along, (x, y) = first_axis(chain)
     lean = leaning(along)
@@ -305,7 +306,7 @@ def _first_joint(chain: Chain) -> tuple[float, tuple[float, float]]:
 
 
 def _on_first_axis(chain: Chain, place: tuple[float, float]) -> bool:
-    """Whether the first joint turns about a place: exactly, where kinematics may be singular."""
+    """Whether a place lies on the first joint's vertical axis; turning that joint is then exact."""
     along, _ = first_axis(chain)
-    off = np.cross(np.subtract((*place, 0.0), chain.origins[0][:3]), along)
-    return leaning(along) <= UPRIGHT and bool(np.linalg.norm(off) <= _ON_AXIS)
+    offset = np.cross(np.subtract((*place, 0.0), chain.origins[0][:3]), along)
+    return leaning(along) <= UPRIGHT and bool(np.linalg.norm(offset) <= _ON_AXIS)
