@@ -1,13 +1,13 @@
-"""Timeline alignment: move demonstrations in time so that their dynamic phases coincide.
+"""Timeline alignment: shift demonstrations in time so that their dynamic phases coincide.
 
 The paper aligns by hand ("Timeline Aligned Variants", Fig. "Timeline Alignment"); here the shifts
-come from the motions themselves. A demonstration is only moved, never stretched: its speed decides
-where the object goes. What a shift uncovers is held where the demonstration rests, and goes on with
-its velocity where it does not (`extrapolation`).
+are estimated from the motions. A demonstration is only shifted, never stretched: its speed decides
+where the object goes. Uncovered frames are held if the demonstration rests there, else extrapolated
+with its velocity (`extrapolation`).
 
 Notation:
     A_i  plan of demonstration i               (H, D)  unit of its format
-    s_i  time that A_i is moved later          scalar  [s]
+    s_i  delay of A_i                          scalar  [s]
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ from prior_reinforce.plans.speeds import SMOOTHING, frames_at_rest, velocity_pro
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """Aligned demonstrations, and how far each was moved."""
+    """Aligned demonstrations, and the shift of each."""
 
     demonstrations: Demonstrations
-    """The same outcomes with plans on one timeline. The horizon is longer than before only where
-    a motion would otherwise have been cut off."""
+    """The same outcomes with plans on one timeline. The horizon is longer than before only if a
+    motion would otherwise be cut off."""
     shifts: Float[np.ndarray, " N"]
-    """s_i, in [s]; positive where a demonstration was moved later."""
+    """s_i, in [s]; positive if a demonstration was delayed."""
 
 
 def align(demonstrations: Demonstrations, *, smoothing: float = SMOOTHING) -> Alignment:
-    """Move every demonstration in time until their velocity profiles agree best.
+    """Shift every demonstration in time so that their velocity profiles agree best.
 
     Each velocity profile (all action dimensions; those of one unit divided by their pooled root
-    mean square) is moved to where it correlates best with the sum of the others, in turn, until
-    nothing moves: a coordinate ascent on the sum of all pairwise correlations. Lags are continuous,
-    not whole frames. The common offset, which no correlation can tell, is the one with mean shift
+    mean square) is shifted to where it correlates best with the sum of the others, in turn, until
+    convergence: a coordinate ascent on the sum of all pairwise correlations. Lags are continuous,
+    not whole frames. The common offset, which no correlation determines, is the one with mean shift
     zero, or the nearest to it that cuts no motion off.
 
     Args:

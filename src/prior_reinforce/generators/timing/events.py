@@ -1,7 +1,7 @@
-"""Events: channels that rest but for short transitions, each of which comes at a time of its own.
+"""Events: transitions of channels that otherwise rest, each with a time of its own.
 
 A gripper is not warped with the arm. Its path is split at its transitions into parts, which are
-aligned on the common phase, and when each comes is one number of the plan (`timeline`). Ours.
+aligned on the common phase, and the time of each is one number of the plan (`timeline`). Ours.
 
 Notation:
     t    time of a plan             [frames]
@@ -21,18 +21,18 @@ from prior_reinforce.plans.signals import Signals, active_runs
 
 @dataclass(frozen=True)
 class Step:
-    """A channel that is timed by itself: split at its M transitions."""
+    """A channel with its own timing, split at its M transitions."""
 
     channel: int
     phases: tuple[int, ...]
-    """Where on the common phase each transition stands, in whole frames."""
+    """Common phase of each transition, in whole frames."""
     levels: tuple[float, ...] = ()
-    """The values of a switch, which takes no others; empty where there are more."""
+    """The values of a switch, which takes no others; empty for other channels."""
 
     def split(
         self, values: Float[np.ndarray, " H"], times: Int[np.ndarray, " M"], tau: np.ndarray
     ) -> Float[np.ndarray, "L M"]:
-        """Split a channel at transitions (frames): its first part, and the others as changes."""
+        """Split a channel at transitions (frames) into its first part and subsequent changes."""
         borders = np.concatenate([[0], (times[1:] + times[:-1]) // 2, [len(values) - 1]])
         parts = []
         for m, phase in enumerate(self.phases):
@@ -43,7 +43,7 @@ class Step:
     def join(
         self, parts: Float[np.ndarray, "L M"], samples: Float[np.ndarray, "M H"]
     ) -> Float[np.ndarray, " H"]:
-        """Add up the parts, each at its own samples; a switch takes its nearest value."""
+        """Add up the parts, each at its own samples; a switch is rounded to its nearest value."""
         values = sum(at_samples(p, at) for p, at in zip(parts.T, samples, strict=True))
         if not self.levels:
             return np.asarray(values)
@@ -54,16 +54,16 @@ class Step:
 def at_samples(
     values: Float[np.ndarray, " L"], samples: Float[np.ndarray, " H"]
 ) -> Float[np.ndarray, " H"]:
-    """Return values at parts of samples, on lines: a step never overshoots."""
+    """Interpolate values linearly at fractional samples: a step never overshoots."""
     return np.interp(samples, np.arange(len(values)), values)
 
 
 def transitions(
     values: Float[np.ndarray, "N H"], sigma: float = 0.0
 ) -> Float[np.ndarray, "N M"] | None:
-    """Return when a `step` or `switch` changes: the middle of each transition, in frames.
+    """Return the middle of each transition of a `step` or `switch`, in frames.
 
-    M times of each demonstration, in order; None where demonstrations differ in their number.
+    M times for each demonstration, in order; None if demonstrations differ in M.
     """
     changes = np.abs(np.diff(values, axis=1))
     times = [
@@ -74,9 +74,9 @@ def transitions(
 
 
 def find_transitions(plans: Plans, signals: Signals) -> dict[int, Float[np.ndarray, "N M"]]:
-    """Return the transitions of each channel that is timed by itself.
+    """Return the transitions of each channel with its own timing.
 
-    None are where all channels jump, since the jumps are then the motion.
+    If all channels jump, none has, since the jumps are then the motion.
     """
     found = {
         int(d): times

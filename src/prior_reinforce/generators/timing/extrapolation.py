@@ -1,7 +1,7 @@
-"""Plans as functions of time, also outside the frames that were recorded.
+"""Extrapolation of plans as functions of time beyond the recorded frames.
 
-Where a plan rests at an end it holds there; where it does not, it goes on with the velocity of its
-last frames. So no rest is needed at either end, and nothing is cut off. Ours.
+A plan that rests at an end is held there; another one continues with the velocity of its last
+frames. So no rest is needed at either end, and nothing is cut off. Ours.
 """
 
 from __future__ import annotations
@@ -21,13 +21,14 @@ mid-swing by 0.4 and 1 % of a range, and hit as often."""
 class ExtrapolatedPlans:
     """Plans at any time: recorded at whole frames, on a cubic spline between them.
 
-    Channels that jump are on lines between frames, so that they do not overshoot, and never go on.
+    Channels that jump are interpolated linearly, so that they do not overshoot, and are held
+    outside.
     """
 
     def __init__(
         self, plans: Plans, jumps: Bool[np.ndarray, " D"], speeds: Float[np.ndarray, "n H"]
     ) -> None:
-        """Find where each plan rests, of which `speeds` tell; `jumps` are steps and switches."""
+        """Fit the splines; plans rest at ends where `speeds` are low, `jumps` are held."""
         from scipy.interpolate import make_interp_spline
 
         horizon = plans.shape[1]

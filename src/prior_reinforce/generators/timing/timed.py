@@ -1,16 +1,16 @@
 """Wrapper that separates timing from shape: a generator learns shapes and warps, not frames.
 
-Demonstrations of one throw start at different times, and run at different tempos. A generator that
-is asked for something between two of them averages a swing that has begun with one that has not,
-which slows it: a throw 0.1 s too early and one 0.1 s too late average to one that lands 8 cm short
+Demonstrations of one throw start at different times, and run at different tempos. Between two of
+them, a generator averages a swing that has begun with one that has not, which slows it: a throw
+0.1 s too early and one 0.1 s too late average to one that lands 8 cm short
 (docs/tasks/basketball.md). Remedies, for every generator:
 
 - `start`, `tempo`: plans are decomposed into shapes on a common phase and a few numbers each
-  (`timeline`), which become dimensions of the plan, constant over it, that the generator learns
-  with the shape. Nothing is lost: demonstrations are reproduced, or, where so few frames
-  cannot be moved, kept as recorded (`timeline`). Ours; movement primitives
-  have parameters for start time and duration as well [Ijspeert2013].
-- `auto`: whichever of them, or none, best predicts left-out outcomes (`evidence`);
+  (`timeline`), which become constant dimensions of the plan that the generator learns with the
+  shape. Nothing is lost: demonstrations are reproduced, or, if they have too few frames to be
+  shifted, kept as recorded. Ours; movement primitives have parameters for start time and duration
+  as well [Ijspeert2013].
+- `auto`: the one of them, or none, that best predicts left-out outcomes (`evidence`);
   `remarks` says which, and why.
 - `align`: the demonstrations are aligned first (`alignment`), so that all generated plans
   start together (paper, "Timeline Aligned Variants").
@@ -43,10 +43,10 @@ class Timed(Wrapper):
 
     name: ClassVar[str] = "timed"
     timeline: Timeline | None = None
-    """The common phase that was learned on; None before `fit`, and where plans are aligned."""
+    """The common phase of what was learned; None before `fit`, and if plans are aligned."""
 
     def __init__(self, generator: Generator, timing: Timing = "auto") -> None:
-        """Wrap a generator; the module tells what each timing is.
+        """Wrap a generator; the module describes each timing.
 
         ConfigurationError if there is no such timing, or the generator is timed already.
         """
@@ -81,7 +81,7 @@ class Timed(Wrapper):
     def from_state(
         cls, settings: Mapping[str, Any], tensors: Tensors, generator: Generator | None = None
     ) -> Self:
-        """Take up the common phase; see `Generator.from_state`."""
+        """Restore the common phase; see `Generator.from_state`."""
         made = super().from_state(settings, tensors, generator)
         made.timing = settings["timing"]
         made.timeline = msgspec.convert(settings["timeline"], Timeline | None)
@@ -100,11 +100,11 @@ class Timed(Wrapper):
 
 
 def _as_plans(decomposition: Decomposition, demonstrations: Demonstrations) -> Demonstrations:
-    """Shapes, with the numbers of their warps as further dimensions, constant over each."""
+    """Return shapes as plans, with the numbers of their warps as further, constant dimensions."""
     names, units = decomposition.timeline.names(demonstrations.format)
     n_channels, length = decomposition.shapes.shape[2], decomposition.shapes.shape[1]
     shapes = decomposition.shapes.copy()
-    for name in demonstrations.format.per_plan:  # to the last digit, also where resampled
+    for name in demonstrations.format.per_plan:  # resampling may change the last digit
         shapes[:, :, names.index(name)] = shapes[:, :1, names.index(name)]
     numbers = np.repeat(decomposition.numbers[:, None], length, axis=1)
     return demonstrations.with_plans(
