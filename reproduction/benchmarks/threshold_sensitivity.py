@@ -47,7 +47,7 @@ from reproduction.zoo import DEVELOPED_ON
 THRESHOLDS = (
     "generators.timing.registration.CONVERGED",
     "generators.timing.registration._NEWTON_STEPS",
-    "generators.timing.registration._SEARCHED",
+    "generators.timing.registration._LARGEST_SHIFT",
     "generators.timing.registration._COMPARED",
     "generators.timing.registration._FINE",
     "plans.signals._MAX_LEVELS",

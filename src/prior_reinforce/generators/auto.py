@@ -1,12 +1,12 @@
-"""The generator that demonstrations ask for: closed form, or a network where patterns are mixed.
+"""Choose the generator by the demonstrations: closed form, or a network if patterns are mixed.
 
 One motion pattern is learned in closed form, in about a second: plans are mixed by a spline over
-outcomes (`plans.outcome_weights`), timing apart (`timing_evidence`). Because the weights reproduce
-affine functions, whatever else differs between demonstrations (posture, tempo, a second manner, an
-outlier) cancels to first order, as long as outcomes were measured. Where demonstrations show
-patterns that do not mix (`patterns`), each that is large enough is learned so, a plan is of the one
-with the nearest outcome, and others are left out and named; where none is, a network learns all of
-them. Ours; on which evidence, reproduction/docs/decisions-generator.md tells.
+outcomes (`plans.outcome_weights`), separately from timing (`timing.evidence`). Because the weights
+reproduce affine functions, other differences between demonstrations (posture, tempo, a second
+manner, an outlier) cancel to first order, as long as outcomes were measured. If demonstrations show
+patterns that do not mix (`patterns`), each large enough pattern is learned so, a plan is of the one
+with the nearest outcome, and the others are left out and named; if none is large enough, a network
+learns all of them. Ours; reproduction/docs/decisions-generator.md gives the evidence.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from prior_reinforce.generators.timing.timed import Timed, Timing
 from prior_reinforce.plans.motions import Demonstrations
 
 _MORE_THAN_AFFINE = 1
-"""A pattern is learned alone if it has k + 1 demonstrations and this many more. Ours: an affine
-function of the outcome, and something to tell its bending by; 4 a way hit 0.81 to 0.86 of first
-throws on `zoo.SEVERAL_WAYS` (tuning goals)."""
+"""A pattern is learned alone if it has k + 1 demonstrations and this many more. Ours: they
+determine an affine function of the outcome, and some of its curvature; 4 a way hit 0.81 to 0.86 of
+first throws on `zoo.SEVERAL_WAYS` (tuning goals)."""
 
-_TIMING_TOLD_BY = 4
-"""So many demonstrations tell their timing by leaving one out (ours); of fewer the rest is too
-little to learn from."""
+_FEWEST_FOR_TIMING = 4
+"""Fewest demonstrations whose timing is chosen by leaving one out (ours); of fewer, too few are
+left to learn from."""
 
 
 class Auto(Wrapper):
-    """Closed form or diffusion, with the timing and the pattern that demonstrations ask for."""
+    """Closed form or diffusion, with timing and patterns chosen by the demonstrations."""
 
     name: ClassVar[str] = "auto"
 
@@ -46,9 +46,9 @@ class Auto(Wrapper):
         device: str = "cpu",
         threads: int = 1,
     ) -> None:
-        """Choose where a network would be trained, if one is needed (see `NetworkGenerator`).
+        """Choose the device of a network, if one is needed (see `NetworkGenerator`).
 
-        `generator` is what was chosen, of a saved model; `fit` chooses anew.
+        `generator` is the chosen one of a saved model; `fit` chooses anew.
         """
         super().__init__(generator or Timed(SmoothInterpolation()))
         self._network: dict[str, Any] = {"device": device, "threads": threads}
@@ -61,8 +61,7 @@ class Auto(Wrapper):
         left_out = sorted(set(range(demonstrations.n)) - {i for way in ways for i in way})
         learned = demonstrations
         if len(groups) == 1:
-            # Fewer cannot tell which timing predicts the others' outcomes best.
-            timing: Timing = "auto" if demonstrations.n >= _TIMING_TOLD_BY else "align"
+            timing: Timing = "auto" if demonstrations.n >= _FEWEST_FOR_TIMING else "align"
             self.generator = Timed(SmoothInterpolation(), timing)
             remark = "generator: closed form, since the demonstrations show one pattern"
         elif not ways:
@@ -91,7 +90,7 @@ class Auto(Wrapper):
         self.remarks = (remark,)
 
     def _stands_alone(self, demonstrations: Demonstrations, group: tuple[int, ...]) -> bool:
-        """Whether a pattern has demonstrations enough, and outcomes that are not on a line."""
+        """Whether a pattern has enough demonstrations, and outcomes that are not on a line."""
         if len(group) < demonstrations.outcome_dim + 1 + _MORE_THAN_AFFINE:
             return False
         try:

@@ -1,8 +1,8 @@
 """The interface of pi: conditions in, whole action plans out (paper, Stage 1).
 
-A member says how it learns (`_fit`), how it generates (`_generate`), and what it keeps on disk
-(`state`, `from_state`). What all have in common is here: checked conditions, saving and loading. So
-is what those around another one have in common (`Wrapper`).
+A generator implements learning (`_fit`), generation (`_generate`), and what is saved (`state`,
+`from_state`). Checking of conditions, saving and loading are here, as is the base class of
+generators around another one (`Wrapper`).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _LOG = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class FitProgress:
-    """Where a fit stands, for a progress line."""
+    """Progress of a fit, for a progress line."""
 
     step: int
     """Steps done."""
@@ -51,10 +51,10 @@ OnProgress = Callable[[FitProgress], None]
 
 
 class Generator(ABC):
-    """A conditional motion generator: an outcome that is wished for, a plan that may reach it.
+    """A conditional motion generator: maps a desired outcome to a plan that may reach it.
 
-    After `fit` it is a function: the same conditions give the same plans, whatever was generated
-    before (reproduction/docs/decisions.md says why diffusion samples with noise drawn once).
+    After `fit` it is a function: the same conditions always give the same plans
+    (reproduction/docs/decisions.md says why diffusion samples with noise drawn once).
     """
 
     name: ClassVar[str]
@@ -100,9 +100,8 @@ class Generator(ABC):
             conditions: c, shape (n, k), in the units of the outcomes. Any n, also 0.
 
         Returns:
-            Plans, float64, in the demonstrations' units. Where a symmetry makes some longer than
-            others, shorter ones rest at their last frame; a plan that is asked for alone is not
-            padded.
+            Plans, float64, in the demonstrations' units. If a symmetry makes some longer than
+            others, shorter ones rest at their last frame; a single plan is not padded.
 
         Raises:
             NotFittedError: Before `fit`.
@@ -111,7 +110,7 @@ class Generator(ABC):
         return self._generate(as_conditions(conditions, self._fitted_to()))
 
     def with_symmetry_used(self, demonstrations: Demonstrations) -> Demonstrations:
-        """Return what it was fitted to, with the symmetry by which it moves plans, stated or found.
+        """Return its demonstrations with the symmetry by which it moves plans, stated or found.
 
         An adapter starts with these, so that it knows how plans are made.
         """
@@ -184,7 +183,7 @@ class Generator(ABC):
         return self
 
     def pack(self) -> list[SavedLayer]:
-        """Return all that was learned, as data; a wrapper first, then what it wraps.
+        """Return everything learned, as data; a wrapper first, then the generator it wraps.
 
         Raises:
             NotFittedError: Before `fit`.
@@ -204,10 +203,10 @@ class Generator(ABC):
             FileFormatError: Something is missing, or does not fit; a class of one's own raises its
                 own error, which may be a bug in its `from_state`.
         """
-        around = () if inner is None else (inner,)
+        wrapped = () if inner is None else (inner,)
         try:
-            generator = cls.from_state(layer.settings, layer.tensors, *around)
-        except Exception as error:  # whatever numbers and settings of another kind lead to
+            generator = cls.from_state(layer.settings, layer.tensors, *wrapped)
+        except Exception as error:  # wrong settings and arrays may raise anything
             if not cls.__module__.startswith("prior_reinforce."):
                 raise
             raise FileFormatError(
@@ -233,11 +232,11 @@ class Generator(ABC):
 
     @classmethod
     def from_state(cls, settings: Mapping[str, Any], tensors: Tensors) -> Self:
-        """Rebuild it from what `state` gave; checksums say that a file holds just that."""
+        """Rebuild it from its `state`; checksums have verified the file."""
         raise NotImplementedError
 
     def _fitted_to(self) -> int:
-        """Return k of what was learned."""
+        """Return k of the demonstrations; NotFittedError before `fit`."""
         if self._outcome_dim is None:
             raise NotFittedError(
                 f"this {type(self).__name__} has learned nothing yet; call fit first"
@@ -261,7 +260,7 @@ class Wrapper(Generator):
         self.generator = generator
 
     def __repr__(self) -> str:
-        """Class, and what is wrapped: of `auto`, what it chose."""
+        """Class, and the wrapped generator: for `auto`, the chosen one."""
         return f"{type(self).__name__}({self.generator!r})"
 
     def fit(
@@ -286,7 +285,7 @@ class Wrapper(Generator):
         return self
 
     def pack(self) -> list[SavedLayer]:
-        """Return what both learned; see `Generator.pack`."""
+        """Return the layers of both; see `Generator.pack`."""
         return super().pack() + self.generator.pack()
 
     def state(self) -> tuple[dict[str, Any], Tensors]:
@@ -297,7 +296,7 @@ class Wrapper(Generator):
     def from_state(
         cls, settings: Mapping[str, Any], tensors: Tensors, generator: Generator | None = None
     ) -> Self:
-        """Rebuild it around a generator that was rebuilt already; see `Generator.from_state`."""
+        """Rebuild it around an already rebuilt generator; see `Generator.from_state`."""
         if generator is None:
             raise FileFormatError(
                 f"a {cls.name} generator is rebuilt around another; learn it again"
@@ -305,7 +304,7 @@ class Wrapper(Generator):
         return cls(generator)
 
 
-def at_once(progress: OnProgress, loss: float) -> None:
+def report_single_step(progress: OnProgress, loss: float) -> None:
     """Report a fit that is a single step."""
     progress(FitProgress(step=1, n_steps=1, loss=loss, seconds_left=0.0))
 
@@ -319,11 +318,11 @@ class ConditionScale:
 
     @classmethod
     def fit(cls, outcomes: Points) -> Self:
-        """Take the range of outcomes; `Demonstrations` has none of zero width."""
+        """Take the range of outcomes, which in `Demonstrations` is never zero."""
         return cls(np.stack([outcomes.min(axis=0), outcomes.max(axis=0)]))
 
     def scale(self, conditions: Points) -> Points:
-        """Scale conditions that are in their own units."""
+        """Scale conditions from their own units."""
         low, high = self.range
         scaled: np.ndarray = 2 * (conditions - low) / (high - low) - 1
         return scaled

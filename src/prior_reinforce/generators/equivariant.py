@@ -24,7 +24,7 @@ from typing_extensions import Self
 from prior_reinforce.arrays import Frames, Plans, Point, Points
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.formats import OutcomeFormat
-from prior_reinforce.generators.base import Generator, OnProgress, Wrapper, at_once
+from prior_reinforce.generators.base import Generator, OnProgress, Wrapper, report_single_step
 from prior_reinforce.generators.saving import SavedLayer, Tensors
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.symmetry import Anchors, Symmetry, TurnJoint
@@ -88,7 +88,7 @@ class Equivariant(Wrapper):
             self.generator.fit(canonical, seed=seed, progress=progress)
             how = "demonstrations are brought to one place, mixed there, and moved to the goal"
         else:
-            at_once(progress, loss=0.0)
+            report_single_step(progress, loss=0.0)
             how = f"the {'nearest ' * (demonstrations.n > 1)}demonstration is moved to the goal"
         remark = f"symmetry: {symmetry.name}; {how}"
         self.remarks = (remark if declared else _say_found(symmetry, demonstrations.format.names),)

@@ -5,11 +5,11 @@
 - `NearestNeighbours`: the paper's simplest baseline, "I.N.N.", w_i proportional to |c - r_i|^-p
   over the m nearest outcomes.
 - `SmoothInterpolation`: w the cardinal weights of a polyharmonic spline with an affine tail, the
-  strongest way to mix demonstrations we know. Not in the paper; ours, because it asks how much of a
-  generator's work is done by the assumption that plans depend smoothly on outcomes.
+  strongest way to mix demonstrations we know. Not in the paper; ours, to measure how much of a
+  generator's success is due to the assumption that plans depend smoothly on outcomes.
 
-Demonstrations that begin their motion at different times give a blur of two motions rather than one
-in between; on aligned ones the second is hard to beat (reproduction/docs/baselines.md).
+Demonstrations that begin their motion at different times mix to a blur of two motions rather than
+one in between; on aligned ones the second is hard to beat (reproduction/docs/baselines.md).
 
 Notation:
     A_i  plans       in their units
@@ -29,7 +29,7 @@ from jaxtyping import Float
 from typing_extensions import Self
 
 from prior_reinforce.arrays import Plans, Points
-from prior_reinforce.generators.base import Generator, OnProgress, at_once
+from prior_reinforce.generators.base import Generator, OnProgress, report_single_step
 from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.outcome_weights import Kernel, smooth_weights
@@ -39,18 +39,18 @@ from prior_reinforce.settings import Checked
 
 @dataclass(frozen=True)
 class SmoothInterpolationConfig(Checked):
-    """How plans are interpolated; reproduction/docs/baselines.md tells what was tried."""
+    """Settings of interpolation; reproduction/docs/baselines.md lists what was tried."""
 
     kernel: Kernel = "auto"
     """Radial function: the cube of distance, of least bending (`thin-plate`), or distance itself
-    (`linear`); `auto` is the first, or the last where outcomes lie too close together for it."""
+    (`linear`); `auto` is the first, or the last if outcomes lie too close together for it."""
     ways: tuple[tuple[int, ...], ...] = ()
-    """Demonstrations of each way, which are not mixed with those of another: a plan is of the way
-    that has the nearest outcome. Empty: all are of one way."""
+    """Numbers of the demonstrations of each way of doing the task. Ways are not mixed: a plan is of
+    the way with the nearest outcome. Empty: all are of one way."""
 
 
 class Mixture(Generator):
-    """Weighted sums of the demonstrated plans; a member says what the weights are."""
+    """Weighted sums of the demonstrated plans; a subclass defines the weights."""
 
     config_type: ClassVar[type[Any]]
     _plans: Plans
@@ -63,7 +63,7 @@ class Mixture(Generator):
 
     @abstractmethod
     def _weights(self, conditions: Points) -> Float[np.ndarray, "n N"]:
-        """How much of each plan goes into the plan for each condition."""
+        """Return the weight of each demonstration in the plan for each condition."""
 
     def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:
         """Keep the demonstrations; nothing is random and nothing takes time."""
@@ -72,7 +72,7 @@ class Mixture(Generator):
             demonstrations.outcomes_seen.copy(),
             demonstrations.outcome_noise.copy(),
         )
-        at_once(progress, loss=0.0)
+        report_single_step(progress, loss=0.0)
 
     def _generate(self, conditions: Points) -> Plans:
         return np.tensordot(self._weights(conditions), self._plans, axes=1)
@@ -117,15 +117,15 @@ class SmoothInterpolation(Mixture):
             )
 
     def _weights(self, conditions: Points) -> Float[np.ndarray, "n N"]:
-        """Weigh all plans of a way; at an outcome that was measured its own alone, to rounding."""
+        """Weigh the plans of one way; at a measured outcome its own plan alone, to rounding."""
         if not self.config.ways:
             return self._splines[0](conditions)
-        apart = (conditions[:, None] - self._outcomes) / np.ptp(self._outcomes, axis=0)
-        nearest = np.argmin(np.sum(apart**2, axis=2), axis=1)
+        distances = (conditions[:, None] - self._outcomes) / np.ptp(self._outcomes, axis=0)
+        nearest = np.argmin(np.sum(distances**2, axis=2), axis=1)
         weights = np.zeros((len(conditions), len(self._outcomes)))
         for members, spline in zip(self.config.ways, self._splines, strict=True):
-            mine = np.isin(nearest, members)
-            weights[np.ix_(mine, np.array(members))] = spline(conditions[mine])
+            rows = np.isin(nearest, members)
+            weights[np.ix_(rows, np.array(members))] = spline(conditions[rows])
         return weights
 
     def _keep(self, plans: Plans, outcomes: Points, noise: Points) -> None:

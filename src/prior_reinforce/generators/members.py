@@ -1,4 +1,4 @@
-"""All generators by name: choosing one, and loading a saved one.
+"""Registry of all generators by name: make one, or load a saved one.
 
 Classes are named, not imported: `Registry` resolves a name when it is used. So a generator can be
 loaded by its base class, and a list of names imports neither scipy nor torch.
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 _HERE = "prior_reinforce.generators"
 TIMED = {"timing": "auto"}
 _SYMMETRIC = {"symmetry": "use"}
-"""Settings of members, unless a choice says otherwise: timing is learned apart from shape; what the
-demonstrations' symmetry does is taken out before, and put back after."""
+"""Default settings of members: timing is learned separately from shape; plans are made canonical by
+the demonstrations' symmetry before learning, and moved by it afterwards."""
 
 
 class GeneratorRegistry(Registry["Generator"]):
@@ -45,18 +45,18 @@ class GeneratorRegistry(Registry["Generator"]):
         )
 
     def _with(self, setting: str) -> str:
-        """Members that have a setting unless a choice says otherwise."""
+        """Return the names of the members with a setting by default."""
         named = (name for name, member in self.members.items() if setting in member.settings)
         return " and ".join(named)
 
     def _make(
         self, name: str, settings: Mapping[str, Any], context: Mapping[str, Any], choice: str
     ) -> Generator:
-        """Make a generator, wrapped as its settings `timing` and `symmetry` say.
+        """Make a generator, wrapped according to its settings `timing` and `symmetry`.
 
         The context is `device`, `threads` and `states`, for those that take them.
-        ConfigurationError also where there is no such `symmetry`, or another device is asked for
-        than the generator computes on.
+        ConfigurationError also if there is no such `symmetry`, or the generator does not compute on
+        the device.
         """
         from prior_reinforce.generators.equivariant import Equivariant
         from prior_reinforce.generators.timing.timed import Timed
@@ -81,7 +81,7 @@ class GeneratorRegistry(Registry["Generator"]):
         return Equivariant(generator, finds=name == "auto")
 
     def name_of(self, made: Generator) -> str | None:
-        """Return the name of a generator's class, wrapped or not; None where it has none."""
+        """Return the registered name of a generator, wrapped or not; None if it has none."""
         while made.name in _WRAPPERS:
             made = cast(Any, made).generator
         return super().name_of(made)
@@ -117,7 +117,7 @@ _WRAPPERS = {
     "equivariant": f"{_HERE}.equivariant:Equivariant",
     "timed": f"{_HERE}.timing.timed:Timed",
 }
-"""Classes around another generator, by the names that saved models know them by."""
+"""Wrapper classes by their names in saved models."""
 make_generator = GENERATORS.make
 
 
@@ -147,7 +147,7 @@ def unpack(layers: Sequence[SavedLayer]) -> Generator:
 
 
 def _class_of(name: str) -> type[Generator]:
-    """The class of a saved layer."""
+    """Return the class of a saved layer."""
     if name in _WRAPPERS:
         return cast("type[Generator]", pkgutil.resolve_name(_WRAPPERS[name]))
     try:

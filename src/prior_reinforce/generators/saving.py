@@ -1,6 +1,6 @@
-"""Models on disk: `config.json` says what a model is, `model.safetensors` holds its numbers.
+"""Models on disk: `config.json` describes a model, `model.safetensors` holds its arrays.
 
-A model is a stack of layers, the outermost first: a generator, and what it wraps. Both files are
+A model is a stack of layers, the outermost first: a generator, and the one it wraps. Both files are
 data, and reading them runs no code. `config.json` holds a SHA-256 of either file's content, so that
 a damaged copy is an error rather than a slightly different throw.
 """
@@ -26,7 +26,7 @@ Tensors = Mapping[str, Shaped[np.ndarray, "..."]]
 
 
 class SavedLayer(msgspec.Struct, omit_defaults=True):
-    """One generator of a stack, without what it wraps."""
+    """One generator of a stack, without the one it wraps."""
 
     name: str
     """`Generator.name`."""
@@ -111,7 +111,7 @@ def _read_config(path: Path) -> _Config:
 
 
 def without_prefix(prefix: str, tensors: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the tensors of which the name begins so, by the rest of it."""
+    """Return the tensors whose names have a prefix, by their names without it."""
     named = (name for name in tensors if name.startswith(prefix))
     return {name.removeprefix(prefix): tensors[name] for name in named}
 

@@ -36,7 +36,7 @@ from jaxtyping import Float
 from typing_extensions import Self
 
 from prior_reinforce.arrays import Frames, Plans, Points
-from prior_reinforce.generators.base import Generator, OnProgress, at_once
+from prior_reinforce.generators.base import Generator, OnProgress, report_single_step
 from prior_reinforce.generators.saving import Tensors
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.outcome_weights import smooth_weights
@@ -91,7 +91,7 @@ class DynamicMovementPrimitives(Generator):
         )
         outcomes = demonstrations.outcomes_seen.copy()
         self._keep(_Primitives(response, parameters, spans, outcomes, horizon))
-        at_once(progress, loss=float(np.mean((self._generate(outcomes) - plans) ** 2)))
+        report_single_step(progress, loss=float(np.mean((self._generate(outcomes) - plans) ** 2)))
 
     def _generate(self, conditions: Points) -> Plans:
         """Interpolate the primitives and roll each out."""
