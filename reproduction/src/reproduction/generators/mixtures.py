@@ -11,7 +11,7 @@ import math
 
 from jaxtyping import Float, Int
 
-from prior_reinforce.generators.network.denoiser import Denoiser, climbed
+from prior_reinforce.generators.network.denoiser import Denoiser, mean_shift
 from prior_reinforce.generators.network.threads import torch
 
 _BEYOND = 0.5
@@ -71,4 +71,4 @@ def ddim(denoiser: Denoiser) -> torch.Tensor:
         clean = denoiser.clean(x, level)
         noise = (x - math.sqrt(signal) * clean) / math.sqrt(1 - signal)
         x = math.sqrt(next_signal) * clean + math.sqrt(1 - next_signal) * noise
-    return climbed(denoiser, denoiser.clean(x, levels[-1]), polished)
+    return mean_shift(denoiser, denoiser.clean(x, levels[-1]), polished)

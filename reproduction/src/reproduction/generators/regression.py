@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import msgspec
 
 from prior_reinforce.generators.network.config import UNetConfig
-from prior_reinforce.generators.network.network import Learned, NetworkGenerator
+from prior_reinforce.generators.network.network import FittedNetwork, NetworkGenerator
 from prior_reinforce.settings import NonNegative, Positive
 
 if TYPE_CHECKING:
@@ -68,6 +68,6 @@ class UNetRegression(NetworkGenerator):
 
         return lambda: mse_loss(network(conditions), codes)
 
-    def _codes(self, learned: Learned, conditions: Tensor) -> Tensor:
+    def _codes(self, learned: FittedNetwork, conditions: Tensor) -> Tensor:
         codes: Tensor = learned.network(conditions)
         return codes

@@ -16,7 +16,7 @@ import msgspec
 
 from prior_reinforce.generators.network.config import DiffusionConfig, PerceptronSize
 from prior_reinforce.generators.network.diffusion import DiffusionGenerator
-from prior_reinforce.generators.network.network import Learned
+from prior_reinforce.generators.network.network import FittedNetwork
 from prior_reinforce.settings import Count, Positive
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ class DiffusionWays(DiffusionGenerator):
 
         return loss(network, codes, conditions, self.config, rng, draw)
 
-    def _codes(self, learned: Learned, conditions: Tensor) -> Tensor:
+    def _codes(self, learned: FittedNetwork, conditions: Tensor) -> Tensor:
         from prior_reinforce.generators.network.denoiser import sample
         from reproduction.generators.mixtures import ddim
 

@@ -1,11 +1,11 @@
-"""Plans as the network sees them: codes of a few numbers a dimension, scaled to [-1, 1].
+"""Codes of plans for the network: a few numbers for each dimension, scaled to [-1, 1].
 
-Each dimension has a code of its own, decided when the codec is fitted, from the demonstrations
-alone. A smooth one is coded by the control points of a cubic B-spline, about one for every four
-frames, or twice or three times as many where the motion is fast; one that no spline follows (a
-gripper that opens, recorded jitter) by its frames. Where there are more numbers than positions,
-several consecutive ones are folded into one position. A dimension that is one number a plan, or is
-held but for noise, is coded by that number at every position, and decoded by their mean.
+The code of each dimension is chosen from the demonstrations when the codec is fitted. A smooth
+dimension is coded by the control points of a cubic B-spline, about one for every four frames, or
+twice or three times as many if the motion is fast; one that no spline fits (a gripper that opens,
+recorded jitter) by its frames. If there are more numbers than positions, several consecutive ones
+are folded into one position. A dimension that is one number a plan, or is held except for noise, is
+coded by that number at every position, and decoded by their mean.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from prior_reinforce.plans.signals import HELD, NOISE_RMS
 Representation = Literal["splines", "frames"]
 """Splines where they fit, or frames for every dimension."""
 Kind = Literal["spline", "frames", "number"]
-"""How one dimension is coded: by control points, by frames, or by one number a plan."""
+"""Code of one dimension: control points, frames, or one number a plan."""
 Codes = Float[np.ndarray, "n C T"]
 """Coded plans: C numbers at each of T positions in time, those of demonstrations in [-1, 1]."""
 _Values = Float[np.ndarray, "n H"]
@@ -35,38 +35,38 @@ _Values = Float[np.ndarray, "n H"]
 
 _DEGREE = 3
 _LARGEST_SPLINE_RESIDUAL = 2e-3
-"""A dimension is smooth if its spline misses it by at most this fraction of its range, rms.
+"""Largest residual of a spline, rms, as a fraction of the dimension's range.
 
-Ours: minimum-jerk throws are missed by 1e-5 to 1e-4, a step by 3e-2 or more; 2e-3 of a swing of
-1.2 rad is 2.4 mrad, about what moves a landing point by its measuring noise."""
+Ours: minimum-jerk throws have 1e-5 to 1e-4, a step 3e-2 or more; 2e-3 of a swing of 1.2 rad is
+2.4 mrad, about what moves a landing point by its measurement noise."""
 _SPLINE_FOLDS = (1, 2, 3)
-"""Control points for each position of the code: more where fewer do not follow the motion. Ours."""
+"""Control points for each position of the code: more if fewer do not fit the motion. Ours."""
 _MOST_NOISE = 0.02
-"""A spline may also miss what noise makes of a dimension (`NOISE_RMS`), up to this part of its
-range: what is nothing but noise comes back too. Ours."""
+"""The residual may also be as large as the noise (`NOISE_RMS`), up to this part of the range, so
+that pure noise is not coded by frames. Ours."""
 _TIED = 3
 """Equal control points at a resting end: velocity and acceleration vanish there."""
 _STIFFNESS = 0.3
-"""Weight of the control points' third differences (see `_Spline`). Ours: the throws' points come
-back to 1e-5, and an error of the network that alternates from point to point moves the plan's
-acceleration by a third or less of what it did."""
+"""Weight of the control points' third differences (see `_Spline`). Ours: the throws' points are
+reproduced to 1e-5, and an error of the network that alternates from point to point changes the
+plan's acceleration by a third or less of what it would without."""
 _CONSTANT = 1e-9
 """A code whose range is below this, relative to its values, is constant."""
 
 _SETTINGS = ("horizon", "length", "kinds", "folds", "rest_start", "rest_end", "levels", "smoothing")
-"""What a codec is beside its two arrays."""
+"""Fields of a codec that are not arrays."""
 
 
 @dataclass(frozen=True, eq=False)
 class PlanCodec:
-    """Turns plans of one shape into codes and back; made by `fit`."""
+    """Encodes and decodes plans of one shape; made by `fit`."""
 
     horizon: int
     """H."""
     length: int
     """T."""
     kinds: tuple[Kind, ...]
-    """For each of the D dimensions, how it is coded."""
+    """For each of the D dimensions: its code."""
     folds: tuple[int, ...]
     """For each dimension, how many numbers share one position of the code."""
     rest_start: tuple[bool, ...]
@@ -76,7 +76,7 @@ class PlanCodec:
     levels: tuple[tuple[float, ...], ...]
     """For each dimension: the values of a switch; empty where it is none."""
     smoothing: float
-    """Standard deviation in frames of the Gaussian that what is coded by frames is smoothed by."""
+    """Standard deviation, in frames, of the Gaussian that smooths dimensions coded by frames."""
     plan_range: Float[np.ndarray, "2 D"]
     """Least and greatest value a dimension may take: the demonstrations' range, widened by the
     margin."""
@@ -109,7 +109,7 @@ class PlanCodec:
         low, high = plans.min(axis=(0, 1)), plans.max(axis=(0, 1))
         slack = margin * (high - low)
         coded = [
-            _choose(demonstrations, d, length, representation == "splines")
+            _choose_code(demonstrations, d, length, representation == "splines")
             for d in range(action_dim)
         ]
         raw = cls(
@@ -137,13 +137,13 @@ class PlanCodec:
         return self.code_range.shape[1], self.length
 
     def encode(self, plans: Plans) -> Codes:
-        """Code plans; demonstrations land in [-1, 1]."""
+        """Encode plans; demonstrations have codes in [-1, 1]."""
         codes = [self._code(plans[:, :, d], d) for d in range(plans.shape[2])]
         centre, half = self._scale()
         return np.asarray((np.concatenate(codes, axis=1) - centre) / half)
 
     def decode(self, codes: Codes) -> Plans:
-        """Turn codes into plans, at rest and in range as demonstrated."""
+        """Decode plans, at rest and in range as demonstrated."""
         centre, half = self._scale()
         raw = np.split(codes * half + centre, np.cumsum(self.folds)[:-1], axis=1)
         plans = np.empty((len(codes), self.horizon, len(self.kinds)))
@@ -159,7 +159,7 @@ class PlanCodec:
                     from scipy.ndimage import gaussian_filter1d
 
                     values = gaussian_filter1d(values, self.smoothing, axis=1, mode="nearest")
-                # Two equal frames are no velocity at that end.
+                # Equal frames at an end have no velocity.
                 if self.rest_start[d]:
                     values[:, :2] = values[:, :2].mean(axis=1, keepdims=True)
                 if self.rest_end[d]:
@@ -171,7 +171,7 @@ class PlanCodec:
         return np.clip(plans, self.plan_range[0], self.plan_range[1])
 
     def settings(self) -> dict[str, Any]:
-        """Everything but the arrays, as JSON types."""
+        """Return everything except the arrays, as JSON types."""
         return {name: getattr(self, name) for name in _SETTINGS}
 
     @classmethod
@@ -189,7 +189,7 @@ class PlanCodec:
         return cls(**known, plan_range=plan_range, code_range=code_range)
 
     def _scale(self) -> tuple[Float[np.ndarray, "C 1"], Float[np.ndarray, "C 1"]]:
-        """Centre and half width of the range of each number of a code."""
+        """Return centre and half width of the range of each number of a code."""
         low, high = self.code_range
         half = (high - low) / 2
         centre = (high + low) / 2
@@ -197,7 +197,7 @@ class PlanCodec:
         return centre[:, None], np.where(constant, 1.0, half)[:, None]
 
     def _code(self, values: _Values, d: int) -> Float[np.ndarray, "n c T"]:
-        """Unscaled code of one dimension; c = 1, or the fold."""
+        """Return the unscaled code of one dimension; c is 1 or the fold."""
         kind, fold = self.kinds[d], self.folds[d]
         if kind == "number":
             return np.repeat(values.mean(axis=1)[:, None, None], self.length, axis=2)
@@ -213,8 +213,10 @@ class PlanCodec:
         return _spline(self.horizon, n_points, self.rest_start[d], self.rest_end[d])
 
 
-def _choose(demonstrations: Demonstrations, d: int, length: int, splines: bool) -> tuple[Kind, int]:
-    """How one dimension is coded, and its fold."""
+def _choose_code(
+    demonstrations: Demonstrations, d: int, length: int, splines: bool
+) -> tuple[Kind, int]:
+    """Choose the code of one dimension, and its fold."""
     form, signals, horizon = demonstrations.format, demonstrations.signals, demonstrations.horizon
     if form.names[d] in form.per_plan or (splines and signals.kinds[d] == "held"):
         return "number", 1
@@ -230,8 +232,8 @@ def _choose(demonstrations: Demonstrations, d: int, length: int, splines: bool) 
             if _DEGREE < fold * length < horizon:
                 ends = signals.rest_start[d], signals.rest_end[d]
                 spline = _spline(horizon, fold * length, *ends)
-                missed = spline.frames(spline.points(values)) - values
-                if np.sqrt(np.mean(missed**2, axis=1)).max() <= largest:
+                residuals = spline.frames(spline.points(values)) - values
+                if np.sqrt(np.mean(residuals**2, axis=1)).max() <= largest:
                     return "spline", fold
     return "frames", math.ceil(horizon / length)
 
@@ -239,10 +241,9 @@ def _choose(demonstrations: Demonstrations, d: int, length: int, splines: bool) 
 class _Spline:
     """A cubic B-spline with clamped, uniform knots, and equal control points at a resting end.
 
-    What alternates between control points hardly reaches the frames, by Whittaker's smoother: an
-    arm's acceleration limits are met by motions and broken by ripple, of which a milliradian from
-    point to point is several rad/s^2. Points are fitted through the smoother, so that what
-    demonstrations show of it comes back.
+    Whittaker's smoother S^-1, with S = I + w R^T R and third differences R, damps ripple between
+    control points, of which a milliradian is several rad/s^2, beyond an arm's limits. Points are
+    fitted through the smoother, so that demonstrations are reproduced.
     """
 
     def __init__(self, horizon: int, n_points: int, at_start: bool, at_end: bool) -> None:
@@ -256,35 +257,37 @@ class _Spline:
             free = np.maximum(free - (_TIED - 1), 0)
         if at_end:
             free = np.minimum(free, free[-_TIED])
-        self._free, n = free, int(free[-1]) + 1  # which free point each control point is
+        self._free, n = free, int(free[-1]) + 1  # the free point of each control point
         inner = np.linspace(0, horizon - 1, n_points - _DEGREE + 1)
         knots = np.concatenate([[inner[0]] * _DEGREE, inner, [inner[-1]] * _DEGREE])
         basis = BSpline.design_matrix(np.arange(horizon, dtype=float), knots, _DEGREE)
         ends = sparse.csr_array((np.ones(n_points), (np.arange(n_points), free)))
         self._basis = basis @ ends  # (H, n)
-        rough = sparse.csr_array((1, n))  # fewer than four points have no third difference
+        third = sparse.csr_array((1, n))  # fewer than four points have no third difference
         if n > 3:
-            rough = sparse.diags_array([-1.0, 3.0, -3.0, 1.0], offsets=range(4), shape=(n - 3, n))
-        # All are banded, so that what solves them is linear in H.
-        self._roughened = sparse.csc_array(sparse.eye_array(n) + _STIFFNESS * rough.T @ rough)
-        self._smoothed = splu(self._roughened).solve
-        self._fitted = splu(sparse.csc_array(self._basis.T @ self._basis)).solve
+            third = sparse.diags_array([-1.0, 3.0, -3.0, 1.0], offsets=range(4), shape=(n - 3, n))
+        # All matrices are banded, so that their solution is linear in H.
+        self._inverse_smoother = sparse.csc_array(
+            sparse.eye_array(n) + _STIFFNESS * third.T @ third
+        )
+        self._smooth = splu(self._inverse_smoother).solve
+        self._solve_normal = splu(sparse.csc_array(self._basis.T @ self._basis)).solve
 
     def points(self, values: _Values) -> Float[np.ndarray, "n p"]:
-        """Least-squares control points."""
-        free = self._roughened @ self._fitted(self._basis.T @ values.T)
+        """Return the least-squares control points of frames."""
+        free = self._inverse_smoother @ self._solve_normal(self._basis.T @ values.T)
         return np.asarray(free[self._free].T)
 
     def frames(self, points: Float[np.ndarray, "n p"]) -> _Values:
-        """Frames of control points; those that are to be equal are averaged."""
+        """Return the frames of control points; those at a resting end are averaged."""
         first = np.flatnonzero(np.diff(self._free, prepend=-1))
         free = np.add.reduceat(points.T, first) / np.bincount(self._free)[:, None]
-        return np.asarray((self._basis @ self._smoothed(free)).T)
+        return np.asarray((self._basis @ self._smooth(free)).T)
 
 
-_spline = lru_cache(maxsize=8)(_Spline)  # a codec asks for the same few at each plan
+_spline = lru_cache(maxsize=8)(_Spline)  # a codec uses the same few for each plan
 
 
 def _as_tuples(value: Any) -> Any:
-    """JSON's lists as the tuples they were."""
+    """Convert JSON's lists back to tuples."""
     return tuple(map(_as_tuples, value)) if isinstance(value, (list, tuple)) else value

@@ -75,7 +75,7 @@ _LAPTOP = UNetSize(widths=(64, 128, 128), step_width=64, condition_width=64, act
 
 @dataclass(frozen=True)
 class UNetConfig(Checked):
-    """What all generators with a network are set by; the defaults are sized for a laptop."""
+    """Settings of all generators with a network; the defaults are sized for a laptop."""
 
     representation: Representation = "splines"
     """Code plans by spline control points where they fit, or by raw frames."""
@@ -125,14 +125,14 @@ are fewer than its 256; its 5,000 epochs so are 5,000 steps.
 
 @dataclass(frozen=True)
 class DiffusionConfig(UNetConfig):
-    """Everything that decides what `DiffusionGenerator` learns; the defaults suit a laptop.
+    """Settings of `DiffusionGenerator`; the defaults suit a laptop.
 
-    reproduction/docs/decisions-generator.md tells what was tried for each, with figures.
+    reproduction/docs/decisions-generator.md lists what was tried for each, with figures.
     """
 
     coordinates: Literal["span", "time"] = "span"
-    """What is denoised: coordinates of plans in the space that the demonstrations span (`span`), by
-    a perceptron; or their codes over time, by the U-Net, as in the paper."""
+    """Denoise coordinates of plans in the space that the demonstrations span (`span`), by a
+    perceptron; or their codes over time, by the U-Net, as in the paper."""
     perceptron: PerceptronSize = PerceptronSize()
     """Size of the perceptron."""
     training_steps: Annotated[int, msgspec.Meta(ge=0)] = 1500
@@ -148,8 +148,8 @@ class DiffusionConfig(UNetConfig):
     noise_draws: Annotated[int, msgspec.Meta(ge=2, multiple_of=2)] = 8
     """K, noise draws over which a step of mean shift averages; even: a draw and its opposite."""
     shared_noise: bool = True
-    """All conditions share what noise a sampler draws, so that near conditions have near plans; if
-    not, each has its own, as where plans are sampled at random."""
+    """Share a sampler's noise among all conditions, so that near conditions have near plans; if
+    not, each has its own, as if plans were sampled at random."""
     batch_size: Count = 48
     """Samples a step, at least one of each demonstration where there is room."""
     fill_batch: bool = True
@@ -173,7 +173,7 @@ class DiffusionConfig(UNetConfig):
             )
 
     def decay(self, n: int) -> float:
-        """How much of their average the averaged weights keep after n steps."""
+        """Return the decay of the averaged weights after n steps."""
         return min(1.0 - (1.0 + n) ** -self.ema_power, self.ema_limit)
 
     @classmethod

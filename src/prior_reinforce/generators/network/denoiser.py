@@ -1,8 +1,8 @@
-"""The denoising network, trained on a handful of codes, and two ways to run it.
+"""Loss and samplers of the denoising network, which is trained on a handful of codes.
 
 The adapter needs the same plan for the same condition, and near plans for near conditions. So
 noise comes from the fit's seed and is shared by all conditions. With `shared_noise=False` each has
-its own, as where plans are sampled at random; still the same condition has the same plan.
+its own, as if plans were sampled at random; still the same condition has the same plan.
 
 Notation:
     B  batch    C  numbers of a code at one position    T  positions    n  conditions    k  outcome
@@ -23,12 +23,12 @@ from prior_reinforce.generators.network.threads import torch
 
 _SLACK = 0.5
 """How far coordinates in the demonstrations' span may leave their range, as a fraction of half of
-it; plans keep to the margin besides. Ours: at the ends of the region a straight line leaves it by a
-third."""
+it; plans are clipped to the margin as well. Ours: at the ends of the region a straight line leaves
+it by a third."""
 Denoise = Callable[[torch.Tensor, torch.Tensor, torch.Tensor], torch.Tensor]
 """A network: noisy codes (B, C, T), levels (B,) and conditions (B, k) to a prediction."""
 Draw = Callable[[torch.Tensor], "tuple[torch.Tensor, torch.Tensor]"]
-"""Rows of demonstrations (B,) to clean codes (B, C, T) and their conditions (B, k)."""
+"""Numbers of demonstrations (B,) to clean codes (B, C, T) and their conditions (B, k)."""
 
 
 def loss(
@@ -39,11 +39,11 @@ def loss(
     rng: torch.Generator,
     draw: Draw | None = None,
 ) -> Callable[[], torch.Tensor]:
-    """Return what draws a batch and tells how far the network is off, mean square.
+    """Return a function that draws a batch and computes the network's mean squared error.
 
-    The network is of one member, or of several, each with a prediction of its own; `codes` are x_0
-    of the demonstrations and `conditions` scaled outcomes, both on its device. `draw` says what the
-    samples of a batch are; the demonstrations themselves when None.
+    The network has one member or several, each with its own prediction. `codes` are x_0 of the
+    demonstrations and `conditions` their scaled outcomes, both on its device. `draw` makes the
+    samples of a batch; the demonstrations themselves when None.
     """
     schedule = NoiseSchedule.squared_cosine(config.noise_levels)
 
@@ -63,9 +63,9 @@ def loss(
 def draw_batch(
     n: int, config: DiffusionConfig, rng: torch.Generator
 ) -> tuple[Int[torch.Tensor, " B"], Int[torch.Tensor, " B"]]:
-    """Draw which of n demonstrations and which noise levels make a batch.
+    """Draw a batch: numbers of n demonstrations, and noise levels.
 
-    Each demonstration comes as often as any other to within one.
+    Each demonstration occurs as often as any other to within one.
     """
     size = config.batch_size if config.fill_batch else min(config.batch_size, n)
     passes = math.ceil(size / n)
@@ -87,9 +87,9 @@ def sample(
     seed: int,
     sampler: Callable[[Denoiser], torch.Tensor] | None = None,
 ) -> Float[torch.Tensor, "n C T"]:
-    """Return one code (C, T) for each scaled condition, by a network trained with `config`.
+    """Generate one code (C, T) for each scaled condition, by a network trained with `config`.
 
-    The `sampler` is that of the config, if none is given.
+    The `sampler` is the config's by default.
     """
     schedule = NoiseSchedule.squared_cosine(config.noise_levels)
     rows = [b""] if config.shared_noise else [row.tobytes() for row in conditions.cpu().numpy()]
@@ -99,7 +99,7 @@ def sample(
 
 
 def _source(seed: int, condition: bytes) -> torch.Generator:
-    """Noise of a seed; where a condition is given, that condition's own."""
+    """Return the source of noise of a seed, and of a condition unless it is empty."""
     if condition:
         digest = hashlib.sha256(f"{seed} ".encode() + condition).digest()
         seed = int.from_bytes(digest[:7], "big")
@@ -108,7 +108,7 @@ def _source(seed: int, condition: bytes) -> torch.Generator:
 
 @dataclass(frozen=True)
 class Denoiser:
-    """A trained network with the conditions it is asked about."""
+    """A trained network with conditions, and the state of its sampler."""
 
     network: Denoise
     conditions: Float[torch.Tensor, "n k"]
@@ -120,7 +120,7 @@ class Denoiser:
     """Of noise: one for all conditions, or one each."""
 
     def noise(self, count: int) -> Float[torch.Tensor, "n {count} C T"]:
-        """Draw so much for each condition."""
+        """Draw noise for `count` codes of each condition."""
         shape = count, *self.shape
         drawn = torch.stack([torch.randn(shape, generator=source) for source in self.sources])
         return drawn.to(self.conditions.device).expand(len(self.conditions), *shape)
@@ -128,9 +128,9 @@ class Denoiser:
     def clean(
         self, noisy: Float[torch.Tensor, "B C T"], level: int
     ) -> Float[torch.Tensor, "B C T"]:
-        """The network's estimate of x_0, clipped to the range of what was learned and its margin.
+        """Return the network's estimate of x_0, clipped to the demonstrated range and its margin.
 
-        All `noisy` codes, a condition's copies one after another, have the noise of one level.
+        All `noisy` codes, with the copies for one condition in a row, have the same noise level.
         """
         conditions = self.conditions.repeat_interleave(len(noisy) // len(self.conditions), dim=0)
         levels = torch.full((len(noisy),), level, device=noisy.device)
@@ -140,31 +140,31 @@ class Denoiser:
         return estimate.clamp(-bound, bound)
 
 
-def _mean_shift(denoiser: Denoiser) -> torch.Tensor:
-    """Climb to a mode of what was learned: annealed mean shift.
+def _annealed_mean_shift(denoiser: Denoiser) -> torch.Tensor:
+    """Climb to a mode of the learned distribution by annealed mean shift.
 
     An estimate x_0 is noised, at a few falling levels, with the same K draws for every condition,
     and replaced by the mean of the K clean estimates. The mean over noise of E[x_0 | x_t] is a
     mean-shift step at the scale of that noise [Comaniciu2002], so the estimate starts at the mean
-    of all plans for the condition and ends at a mode. Ours; DDIM from x_T = 0 shows the network
+    of all plans for the condition and ends at a mode. Ours; DDIM from x_T = 0 gives the network
     inputs with less noise than it was trained on, and has two to three times the error
     (reproduction/docs/decisions-generator.md).
     """
     config, conditions = denoiser.config, denoiser.conditions
     levels = mean_shift_levels(config.noise_levels, config.sampling_steps)
     mean = torch.zeros((len(conditions), *denoiser.shape), device=conditions.device)
-    return climbed(denoiser, mean, levels)
+    return mean_shift(denoiser, mean, levels)
 
 
-def climbed(denoiser: Denoiser, x: torch.Tensor, at: Sequence[int]) -> torch.Tensor:
-    """Take a mean-shift step at each of some levels."""
+def mean_shift(denoiser: Denoiser, x: torch.Tensor, levels: Sequence[int]) -> torch.Tensor:
+    """Take a mean-shift step from x at each noise level."""
     draws = denoiser.config.noise_draws
     half = denoiser.noise(draws // 2)
-    # Opposite draws cancel what is odd in the noise.
+    # Antithetic draws: terms that are odd in the noise cancel.
     noise = torch.cat([half, -half], dim=1).flatten(0, 1)
-    for level in at:
-        levels = torch.full((len(noise),), level, device=x.device)
-        noisy = denoiser.schedule.add_noise(x.repeat_interleave(draws, dim=0), noise, levels)
+    for level in levels:
+        steps = torch.full((len(noise),), level, device=x.device)
+        noisy = denoiser.schedule.add_noise(x.repeat_interleave(draws, dim=0), noise, steps)
         x = denoiser.clean(noisy, level).view(len(x), draws, *denoiser.shape).mean(dim=1)
     return x
 
@@ -179,6 +179,6 @@ def _ddpm(denoiser: Denoiser) -> torch.Tensor:
 
 
 _SAMPLERS: dict[str, Callable[[Denoiser], torch.Tensor]] = {
-    "mean_shift": _mean_shift,
+    "mean_shift": _annealed_mean_shift,
     "ddpm": _ddpm,
 }

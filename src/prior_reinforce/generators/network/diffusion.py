@@ -1,10 +1,10 @@
 """Diffusion models of plans, conditioned on the outcome (paper, Stage 1).
 
-A network denoises plans (`denoiser`), given the outcome that is wished for. What it generates is a
-function of the condition, which the adapter needs. There are two forms:
+A network denoises plans (`denoiser`), given the desired outcome. A generated plan is a function of
+the condition, as the adapter needs it. There are two forms:
 
 - `diffusion`: a small network denoises coordinates in the demonstrations' span (`span`), and learns
-  when to move apart from how (`Timed`). Ours: it learns six demonstrations in half a minute.
+  timing separately from shape (`Timed`). Ours: it learns six demonstrations in half a minute.
 - `diffusion-paper`: a U-Net denoises whole plans, frame by frame, as in the paper.
 
 Either is a network alone: with `training_steps=0`, the control, it hits nothing.
@@ -18,7 +18,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from prior_reinforce.generators.network.config import DiffusionConfig, Sampler
-from prior_reinforce.generators.network.network import Learned, NetworkGenerator
+from prior_reinforce.generators.network.network import FittedNetwork, NetworkGenerator
 
 if TYPE_CHECKING:
     import torch
@@ -42,14 +42,14 @@ class DiffusionGenerator(NetworkGenerator):
         shared_noise: bool | None = None,
         seed: int | None = None,
     ) -> DiffusionGenerator:
-        """Return a generator with the same network, sampled otherwise; it needs no training.
+        """Return a generator with the same network and another sampling; it needs no training.
 
         Args:
             sampler: Replaces the one of the settings.
             shared_noise: Replaces that of the settings.
-            seed: Of the noise, instead of the fit's. With another one for every trial and
-                `shared_noise=False`, plans are generated anew each time, as the paper does without
-                an adapter.
+            seed: Of the noise, instead of the fit's. With a new one for every trial and
+                `shared_noise=False`, plans are sampled anew each time, as in the paper without an
+                adapter.
 
         Raises:
             NotFittedError: It is not fitted.
@@ -88,7 +88,7 @@ class DiffusionGenerator(NetworkGenerator):
     def _optimiser(self, rng: torch.Generator) -> Mapping[str, Any]:
         return {"betas": _BETAS, "decay": self.config.decay, "rng": rng}
 
-    def _codes(self, learned: Learned, conditions: Tensor) -> Tensor:
+    def _codes(self, learned: FittedNetwork, conditions: Tensor) -> Tensor:
         from prior_reinforce.generators.network.denoiser import sample
 
         shape = (learned.span or learned.codec).shape

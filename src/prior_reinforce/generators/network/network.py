@@ -1,8 +1,8 @@
-"""Generators that are a network between the scale of conditions and the codec of plans.
+"""Base class of generators with a network between scaled conditions and codes of plans.
 
-What diffusion and U-Net regression have in common: conditions are scaled, a network makes codes of
-them, and the codec turns these into plans. Torch, and what is built on it, is imported where a
-network is used: most commands use none, and importing torch takes longer than all that they do.
+Diffusion and U-Net regression share it: conditions are scaled, a network maps them to codes, and
+the codec decodes these to plans. Torch and its dependents are imported only where a network is
+used: most commands use none, and importing torch takes longer than they do.
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ _PREFIX = "network."
 
 
 @dataclass(frozen=True, eq=False)
-class Learned:
-    """What a fit makes, generating runs and saving keeps."""
+class FittedNetwork:
+    """The result of a fit, from which plans are generated, and which is saved."""
 
     codec: PlanCodec
     scale: ConditionScale
     span: Span | None
-    """The space in which codes have coordinates; None: the network makes codes themselves."""
+    """The space in which codes have coordinates; None: the network generates codes themselves."""
     network: nn.Module
     """In evaluation mode, on the device to compute on."""
     seed: int
@@ -53,7 +53,7 @@ class Learned:
 
 
 class NetworkGenerator(Generator):
-    """A generator whose codes come from a network; a member says which, and how it is trained."""
+    """A generator whose codes come from a network; a subclass defines the network and its loss."""
 
     config_type: ClassVar[type[UNetConfig]]
     config: UNetConfig
@@ -72,9 +72,9 @@ class NetworkGenerator(Generator):
             config: All settings; the defaults when None.
             device: Where torch computes, `cpu` or `cuda`.
             threads: Threads to train on. The last digits depend on it, and two are slower than one
-                beside other work; `fit` refuses more than one where torch was imported first. Plans
-                are always generated on one, so that a model means the same ones everywhere.
-            states: Folder in which a training keeps its state, so that it goes on where it was
+                beside other work; `fit` refuses more than one if torch was imported first. Plans
+                are always generated on one, so that a model gives the same ones everywhere.
+            states: Folder in which a training keeps its state, so that it continues after it was
                 killed; None: it begins anew.
 
         Raises:
@@ -87,30 +87,33 @@ class NetworkGenerator(Generator):
         self.config = config or self.config_type()
         self._device = _available(device)
         self._threads, self._states = threads, states
-        self._learned: Learned | None = None
+        self._learned: FittedNetwork | None = None
 
     @property
     def _in_span(self) -> bool:
-        """Whether the network makes coordinates in the demonstrations' span (`Span`)."""
+        """Whether the network generates coordinates in the demonstrations' span (`Span`)."""
         return False
 
     @abstractmethod
     def _build(self, channels: int, length: int, outcome_dim: int) -> nn.Module:
-        """Make the network, of any weights, for codes (C, T) of conditions (k,)."""
+        """Make the untrained network for codes (C, T) of conditions (k,)."""
 
     @abstractmethod
     def _loss(
         self, network: nn.Module, codes: Tensor, conditions: Tensor, rng: torch.Generator
     ) -> Callable[[], Tensor]:
-        """Return what runs the network on a batch of codes (N, C, T) and conditions (N, k)."""
+        """Return a function that computes the loss of a batch.
+
+        The batch is drawn from codes (N, C, T) and conditions (N, k) of the demonstrations.
+        """
 
     def _optimiser(self, rng: torch.Generator) -> Mapping[str, Any]:
-        """What is not the usual of `training.optimise`; `rng` is what the loss may draw from."""
+        """Return settings for `training.optimise`; the loss may draw from `rng`."""
         return {}
 
     @abstractmethod
-    def _codes(self, learned: Learned, conditions: Tensor) -> Tensor:
-        """Make codes (n, C, T) for scaled conditions (n, k)."""
+    def _codes(self, learned: FittedNetwork, conditions: Tensor) -> Tensor:
+        """Generate codes (n, C, T) for scaled conditions (n, k)."""
 
     def _fit(self, demonstrations: Demonstrations, seed: int, progress: OnProgress) -> None:
         from prior_reinforce.generators.network.threads import torch, torch_threads
@@ -133,20 +136,20 @@ class NetworkGenerator(Generator):
         shape = *codes.shape[1:], outcomes.shape[1]
         state = None
         if self._states is not None:
-            told = json.dumps([self.name, asdict(self.config), seed]).encode()
-            digest = sha256(told + codes.tobytes() + scaled.tobytes())
+            settings = json.dumps([self.name, asdict(self.config), seed]).encode()
+            digest = sha256(settings + codes.tobytes() + scaled.tobytes())
             self._states.mkdir(parents=True, exist_ok=True)
             state = self._states / f"{digest[:16]}.safetensors"
         with torch_threads(self._threads):
             network = build(lambda: self._build(*shape), seed).to(self._device)
-            clean, known = self._tensor(codes), self._tensor(scaled)
-            untrained = Learned(codec, scale, span, network.eval(), seed)
-            before = self._missed(untrained, clean, known)
+            clean, conditions = self._tensor(codes), self._tensor(scaled)
+            untrained = FittedNetwork(codec, scale, span, network.eval(), seed)
+            before = self._relative_error(untrained, clean, conditions)
             rng = torch.Generator().manual_seed(seed)
-            loss, how = self._loss(network.train(), clean, known, rng), self._optimiser(rng)
+            loss, how = self._loss(network.train(), clean, conditions, rng), self._optimiser(rng)
             network = optimise(network, loss, self.config, progress, state=state, **how)
             self._learned = replace(untrained, network=network)
-            after = self._missed(self._learned, clean, known)
+            after = self._relative_error(self._learned, clean, conditions)
         if state is not None:
             state.unlink(missing_ok=True)
         self.remarks = (
@@ -154,14 +157,14 @@ class NetworkGenerator(Generator):
             f"{after} of how they differ, untrained by {before}",
         )
 
-    def _missed(self, learned: Learned, codes: Tensor, conditions: Tensor) -> str:
-        """How far off codes are at the demonstrations' outcomes, relative to their spread (rms)."""
+    def _relative_error(self, learned: FittedNetwork, codes: Tensor, conditions: Tensor) -> str:
+        """Return the rms error of the demonstrations' codes, relative to their spread."""
         from prior_reinforce.generators.network.threads import torch
 
         with torch.no_grad():
-            off = (self._codes(learned, conditions) - codes).square().sum()
+            error = (self._codes(learned, conditions) - codes).square().sum()
             spread = (codes - codes.mean(dim=0)).square().sum().clamp(min=1e-12)
-        return f"{float((off / spread).sqrt()):.1%}"
+        return f"{float((error / spread).sqrt()):.1%}"
 
     def _generate(self, conditions: Points) -> Plans:
         from prior_reinforce.generators.network.threads import torch, torch_threads
@@ -170,7 +173,7 @@ class NetworkGenerator(Generator):
         learned, codec = self._learned, self._learned.codec
         scaled = learned.scale.scale(conditions)
         plans = [np.empty((0, codec.horizon, len(codec.kinds)))]
-        # One thread: a plan's last digits would depend on their number.
+        # A plan's last digits depend on the number of threads.
         with torch_threads(1), torch.no_grad():
             for first in range(0, len(scaled), _CHUNK):
                 chunk = scaled[first : first + _CHUNK]
@@ -181,7 +184,7 @@ class NetworkGenerator(Generator):
         return np.concatenate(plans)
 
     def state(self) -> tuple[dict[str, Any], Tensors]:
-        """Settings, codec and seed; weights and the ranges that are scaled to [-1, 1]."""
+        """Settings, codec and seed; weights, and the ranges that map to [-1, 1]."""
         assert self._learned is not None
         learned = self._learned
         weights = learned.network.state_dict()
@@ -218,7 +221,7 @@ class NetworkGenerator(Generator):
         }
         network.load_state_dict(weights)  # refuses missing, unknown and misshapen tensors
         network.eval().requires_grad_(False)
-        generator._learned = Learned(codec, scale, span, network, int(settings["seed"]))
+        generator._learned = FittedNetwork(codec, scale, span, network, int(settings["seed"]))
         return generator
 
     def to(self, device: str) -> Self:
@@ -229,14 +232,14 @@ class NetworkGenerator(Generator):
         return self
 
     def _tensor(self, values: np.ndarray) -> Tensor:
-        """Return numbers as networks compute them: float32, on their device."""
+        """Convert numbers for the network: float32, on its device."""
         from prior_reinforce.generators.network.threads import torch
 
         return torch.as_tensor(values, dtype=torch.float32, device=self._device)
 
 
 def _available(device: str) -> str:
-    """The device, if torch can compute there."""
+    """Return the device; ConfigurationError if torch cannot compute there."""
     if device == "cpu":
         return device
     from prior_reinforce.generators.network.threads import torch

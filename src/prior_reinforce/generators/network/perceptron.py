@@ -1,9 +1,9 @@
-"""The denoising network of a few coordinates: residual layers, steered by the noise level (FiLM).
+"""The denoising network of a few coordinates: residual layers, modulated by noise level (FiLM).
 
-Several of them learn side by side, from other initial weights, and what they predict is averaged:
-what a network does between six demonstrations is partly chance, and a mean of several has less of
-it [Lakshminarayanan2017]. No layer normalises: normalisation bends what is almost linear in the
-condition, which doubled the error between demonstrations
+An ensemble of them learns from different initial weights, and their predictions are averaged: a
+network's prediction between six demonstrations is partly chance, which a mean of several reduces
+[Lakshminarayanan2017]. No layer normalises: normalisation distorts an almost linear dependence on
+the condition, which doubled the error between demonstrations
 (reproduction/docs/decisions-generator.md).
 
 Notation:
@@ -46,7 +46,7 @@ class ConditionalPerceptron(nn.Module):
         steps: Shaped[torch.Tensor, " B"],
         conditions: Float[torch.Tensor, "B k"],
     ) -> Float[torch.Tensor, "*E B L 1"]:
-        """Predict for each sample of a batch: every member in training, then their mean."""
+        """Predict for each sample of a batch: by each member in training, else their mean."""
         step = self.step_embedding(steps).expand(self.members, -1, -1)
         given = torch.cat([noisy[:, :, 0], conditions], dim=1)
         x = self.first(given.expand(self.members, -1, -1))
@@ -58,7 +58,7 @@ class ConditionalPerceptron(nn.Module):
 
 
 class _Linear(nn.Module):
-    """`torch.nn.Linear` for each member, initialised as it is."""
+    """A `torch.nn.Linear` for each member, with the same initialisation."""
 
     def __init__(self, members: int, n_in: int, n_out: int) -> None:
         super().__init__()

@@ -1,7 +1,7 @@
-"""Torch, imported in this one place with threads that sleep while they wait, and how many it uses.
+"""Import torch with threads that sleep while they wait, and set their number.
 
 OpenMP's threads spin by default: two of one training, beside other work, made it take over ten
-times as long. How they wait is read once, when torch is loaded, so it has to be set before.
+times as long. The wait policy is read once, when torch is loaded, so it has to be set before.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from torch import nn as nn  # noqa: E402
 def torch_threads(n: int) -> Iterator[None]:
     """Let torch compute on n threads inside the block.
 
-    The number is part of a result's last digits: sums are split among threads. So it is set rather
-    than inherited from whoever calls. ConfigurationError if there is more than one thread, and
-    torch was loaded before they could be told to sleep.
+    A result's last digits depend on n, since sums are split among threads; so it is set, not
+    inherited from the caller. ConfigurationError if n is more than one, and torch was loaded before
+    the wait policy was set.
     """
     if n > 1 and _SPIN:
         raise ConfigurationError(

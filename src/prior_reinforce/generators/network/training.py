@@ -1,7 +1,7 @@
-"""The one optimiser loop: AdamW, a learning rate that rises and falls, averaged weights, progress.
+"""The optimiser loop: AdamW, a learning rate that rises and falls, averaged weights, progress.
 
-Diffusion and regression hand in what a step's loss is. A long training keeps its state in a file,
-and goes on from there to the last digit.
+Diffusion and regression pass the loss of a step. A long training keeps its state in a file, and
+resumes from it with identical digits.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from prior_reinforce.generators.network.threads import torch
 from prior_reinforce.generators.saving import without_prefix
 
 _REPORTS = 200
-"""Progress is told about so often in a fit."""
+"""Progress reports of a fit, approximately."""
 _MEMORY = 100
 """Steps over which the reported loss is averaged."""
 
 _SAVED_EVERY = 60.0
-"""Least time between two saved states, in [s]. Ours: what a killed training loses, as a rule."""
+"""Least time between two saved states, in [s]. Ours: what a killed training usually loses."""
 _SAVING = 0.02
-"""Share of the time that saving may take. Ours: the paper's network has a state of 1.1 GB, and a
-busy machine took longer to save it each minute than to train."""
+"""Largest share of the time for saving. Ours: the paper's network has a state of 1.1 GB, and a busy
+machine took longer to save it each minute than to train."""
 
 Network = TypeVar("Network", bound=torch.nn.Module)
 
@@ -39,7 +39,7 @@ Network = TypeVar("Network", bound=torch.nn.Module)
 def build(make: Callable[[], Network], seed: int) -> Network:
     """Make a network with weights drawn from a seed.
 
-    Torch's layers draw their initial weights from the global generator: lend it, and put it back.
+    Torch's layers draw their initial weights from the global generator, whose state is restored.
     """
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
@@ -60,16 +60,16 @@ def optimise(
     """Fit a network, on the threads torch has.
 
     Args:
-        network: What is fitted.
+        network: The network.
         loss_of_step: Runs the network on a batch and returns the loss.
         config: Steps, learning rate and weight decay.
         progress: Called some 200 times.
         betas: Of AdamW.
         decay: How much of their average the averaged weights keep after n steps; no averaging if
             None.
-        rng: What `loss_of_step` draws from, if it draws.
-        state: File of this training's state, and of no other's: training goes on from there if it
-            exists, and keeps it up to date. None: nothing is kept.
+        rng: Random generator of `loss_of_step`, if it draws.
+        state: File of this training's state alone: training resumes from it if it exists, and keeps
+            it up to date. None: nothing is kept.
 
     Returns:
         The network, with averaged weights if so, in evaluation mode.
@@ -115,7 +115,7 @@ def optimise(
 
 @dataclass(frozen=True)
 class _Run:
-    """All that changes while a network is fitted."""
+    """The state of a training."""
 
     network: torch.nn.Module
     optimiser: torch.optim.Optimizer
@@ -123,7 +123,7 @@ class _Run:
     rng: torch.Generator | None
 
     def save(self, path: Path, done: int, mean_loss: float) -> None:
-        """Write it, whole or not at all."""
+        """Write the state, whole or not at all."""
         from safetensors.torch import save
 
         moments = self.optimiser.state_dict()["state"]
@@ -140,7 +140,7 @@ class _Run:
         write(path, save({name: value.contiguous() for name, value in tensors.items()}))
 
     def restored(self, path: Path, n_steps: int) -> tuple[int, float]:
-        """Take up what was written: steps done and the mean loss; 0 if nothing was.
+        """Restore a saved state, and return the steps done and the mean loss; 0 without a file.
 
         FileFormatError if it is damaged, or of another training.
         """
@@ -172,7 +172,7 @@ class _Run:
 
 
 def _averaging(decay: Callable[[int], float]) -> Callable[..., None]:
-    """Torch's exponential averaging, with a decay that changes from step to step."""
+    """Return torch's exponential averaging, with a decay that changes from step to step."""
 
     def average(averaged: Any, current: Any, n: torch.Tensor) -> None:
         step: Any = get_ema_multi_avg_fn(decay(int(n)))  # type: ignore[no-untyped-call]
@@ -182,7 +182,7 @@ def _averaging(decay: Callable[[int], float]) -> Callable[..., None]:
 
 
 def learning_rate_factor(step: int, config: UNetConfig) -> float:
-    """Linear warm-up, then half a cosine down to 0 at the last step; in [0, 1]."""
+    """Return linear warm-up, then half a cosine down to 0 at the last step; in [0, 1]."""
     if step < config.warmup_steps:
         return step / config.warmup_steps
     span = max(1, config.training_steps - config.warmup_steps)

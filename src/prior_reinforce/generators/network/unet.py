@@ -1,4 +1,4 @@
-"""The denoising network: a one-dimensional U-Net over time, steered by step and condition.
+"""The denoising network: a one-dimensional U-Net over time, modulated by step and condition.
 
 Layout after Chi et al. 2023, "Diffusion Policy", as published in real-stanford/diffusion_policy
 (commit 5ba07ac, `conditional_unet1d.py`; its layout only, written anew). The two-layer MLP on the
