@@ -77,15 +77,13 @@ _WITHIN = (
     r"|base|basis|waist|torso|shoulder|schulter|elbow|ellbogen|arm|wrist|hand|hip|knee|ankle|neck"
     r"|head|pan|tilt"
 )
-"""Words of angles: those that outweigh a gripper's, that stand alone, or within others
-(`Handgelenk`)."""
+"""Words of angles: outweighing a gripper's, standing alone, or within others (`Handgelenk`)."""
 _RAIL = r"rail|track|linear|slider?|gantry|prismatic|carriage"
 _SLIDE = r"(^|\bscara )[de] ?\d|\baxis e \d|(^|\b(?!d*q|tau|theta|ee|elbow)\w+ )[de]\d"
 """`d3` and `E1`; but `joint_d_3` and Franka's `tau_J_d_3` are desired values."""
 _STRAIGHT = r"[xyz]|lin(ear)?"
 _ALONG = rf"{_STRAIGHT}|{_RAIL}|belt|conveyor|(tcp|eef?)(?!.* [3-5]$)"
-"""Names of what moves at m/s; of a tool's six speeds, `actual_TCP_speed_0` (UR), the last three are
-angular."""
+"""Names of what moves at m/s; the last three of a tool's six speeds (UR) are angular."""
 _OMEGA = r"omega(?! \d+ joint)"
 _SPEED = (
     rf"((?<!(?<!ang)le|\b(?:be|mo|ni|no))(?<!tra|gra|mar|swi|sho)vel(s|o|cmd|ang|{_STRAIGHT})?\b"
@@ -275,8 +273,7 @@ def one_for_all(
 ) -> list[str | None]:
     """Return the unit for each channel that can be in it, and None for the others.
 
-    No gripper and no place is in degrees. If the plan has channels of the unit's kind, only these
-    get it.
+    No gripper and no place is in degrees. Only the plan's channels of that kind get it, if any.
     """
     base = base_of(unit)[0]
     fits = [base_of(own)[0] == base for own in plan_units or (base,) * len(names)]

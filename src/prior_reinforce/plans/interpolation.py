@@ -68,9 +68,7 @@ def interp_columns(
 
 
 def join_frames(frames: ArrayLike, dt: float) -> CubicSpline:
-    """Return the spline through frames (H, D), dt [s] apart, at rest at both ends.
-
-    Its times are [0, (H - 1) dt].
+    """Return the spline over [0, (H - 1) dt [s]] through frames (H, D), at rest at both ends.
 
     InvalidPlanError for another shape, values that are not finite, or a dt that is not positive.
     """

@@ -156,8 +156,8 @@ class Demonstrations:
         """Copy and check everything; warn of units that look wrong, and of repeated outcomes.
 
         Raises:
-            InvalidDemonstrationsError: No plan, several whose outcomes lie in a subspace (on one
-                line when k = 2) without a symmetry, wrong shapes, or values that are not finite.
+            InvalidDemonstrationsError: No plan, outcomes in a subspace (on one line when k = 2)
+                without a symmetry, wrong shapes, or values that are not finite.
             ConfigurationError: What the symmetry turns or shifts is not in m and rad.
         """
         if isinstance(self.plans, (list, tuple)):

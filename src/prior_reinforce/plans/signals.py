@@ -27,6 +27,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Literal
 
 import numpy as np
@@ -72,8 +73,7 @@ _STANDS_OUT = 0.25
 """Noise bounds transitions only if it is less than this part of the largest change: a slow joint at
 1 kHz changes by less than its noise from frame to frame. Ours."""
 _FEWEST_FRAMES = 20
-"""Noise is not estimated from fewer frames, which show motion. Ours: at 20, from five
-differences."""
+"""Noise is not estimated from fewer frames, which show motion. Ours: 20 give five differences."""
 _QUANTILE, _NORMAL = 0.3, 0.385
 """Noise is estimated from the 30 % quantile of absolute third differences, which is 0.385 standard
 deviations of a normal variable."""
@@ -240,13 +240,10 @@ def _kinds(
     sigma: Channels,
 ) -> tuple[ChannelKind, ...]:
     """Classify each channel, from all motions together."""
-    durations = {
-        d: max(
-            (b - a for r in active_runs([s[:, d] for s in steps], sigma[d]) for a, b in r),
-            default=0,
-        )
-        for d in np.flatnonzero(~held)
-    }
+    durations = {}
+    for d in np.flatnonzero(~held):
+        runs = chain.from_iterable(active_runs([step[:, d] for step in steps], sigma[d]))
+        durations[d] = max((end - begin for begin, end in runs), default=0)
     longest = max(durations.values(), default=0)
     kinds: list[ChannelKind] = ["held"] * len(held)
     for d, duration in durations.items():

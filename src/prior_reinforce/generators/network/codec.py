@@ -267,15 +267,13 @@ class _Spline:
         if n > 3:
             third = sparse.diags_array([-1.0, 3.0, -3.0, 1.0], offsets=range(4), shape=(n - 3, n))
         # All matrices are banded, so that their solution is linear in H.
-        self._inverse_smoother = sparse.csc_array(
-            sparse.eye_array(n) + _STIFFNESS * third.T @ third
-        )
-        self._smooth = splu(self._inverse_smoother).solve
+        self._stiffness = sparse.csc_array(sparse.eye_array(n) + _STIFFNESS * third.T @ third)
+        self._smooth = splu(self._stiffness).solve
         self._solve_normal = splu(sparse.csc_array(self._basis.T @ self._basis)).solve
 
     def points(self, values: _Values) -> Float[np.ndarray, "n p"]:
         """Return the least-squares control points of frames."""
-        free = self._inverse_smoother @ self._solve_normal(self._basis.T @ values.T)
+        free = self._stiffness @ self._solve_normal(self._basis.T @ values.T)
         return np.asarray(free[self._free].T)
 
     def frames(self, points: Float[np.ndarray, "n p"]) -> _Values:

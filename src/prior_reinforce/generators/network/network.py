@@ -102,10 +102,7 @@ class NetworkGenerator(Generator):
     def _loss(
         self, network: nn.Module, codes: Tensor, conditions: Tensor, rng: torch.Generator
     ) -> Callable[[], Tensor]:
-        """Return a function that computes the loss of a batch.
-
-        The batch is drawn from codes (N, C, T) and conditions (N, k) of the demonstrations.
-        """
+        """Return a function that computes the loss on a batch of codes and conditions (N, k)."""
 
     def _optimiser(self, rng: torch.Generator) -> Mapping[str, Any]:
         """Return settings for `training.optimise`; the loss may draw from `rng`."""

@@ -21,8 +21,7 @@ mid-swing by 0.4 and 1 % of a range, and hit as often."""
 class ExtrapolatedPlans:
     """Plans at any time: recorded at whole frames, on a cubic spline between them.
 
-    Channels that jump are interpolated linearly, so that they do not overshoot, and are held
-    outside.
+    Channels that jump are linear between frames, so that they never overshoot, and held outside.
     """
 
     def __init__(

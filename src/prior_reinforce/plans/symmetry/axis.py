@@ -49,8 +49,7 @@ class Axis:
     reach: float
     """Mean distance of the outcomes from the declared axis."""
     residual: float
-    """Mean squared difference of hand paths turned about the declared axis, relative to unturned
-    paths."""
+    """Mean squared difference of hand paths turned about the declared axis, over unturned ones."""
     least_residual: float
     """The same about the found axis."""
     n: int
@@ -149,10 +148,7 @@ def _window(path: Float[np.ndarray, "H 2"], half: int) -> Float[np.ndarray, "W 2
 
 
 def _residual(windows: Paths, places: Points, axis: Point) -> float:
-    """Mean squared difference of paths turned onto each other about an axis, relative to unturned.
-
-    Each is turned by the difference of the bearings of the two outcomes.
-    """
+    """Mean squared difference of paths turned about an axis onto each other, over unturned ones."""
     x, y = (places - axis).T
     bearing = np.arctan2(y, x)
     angle = bearing[None] - bearing[:, None]  # from i to j

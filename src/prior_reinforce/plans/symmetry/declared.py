@@ -4,8 +4,7 @@
 - *It pushes or strikes an object that lies at (x, y)*: turns about that place (`about=(x, y)`).
 - *The motion may happen anywhere on the table*: shifts (`distance="shift"`), of poses alone.
 - *Neither*: `about=None`; one outcome is then reached by tempo or amplitude.
-- *Only a turn is known* (`distance="learned"`): all but the bearing is learned from several
-  demonstrations.
+- *Only a turn is known* (`distance="learned"`): several demonstrations determine all the rest.
 
 The names and units of plans distinguish joints of a known arm, poses (x and y in m, with rx, ry and
 rz, or qw, qx, qy and qz, or yaw), and increments of poses (dx, dy, dyaw) along the table's axes.

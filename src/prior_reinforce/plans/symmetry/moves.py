@@ -319,10 +319,9 @@ def _within(angles: Float[np.ndarray, " H"], ends: Ends) -> Float[np.ndarray, " 
 
 
 def middle(plan: Frames) -> float:
-    """Return the mean frame of a motion by squared speed.
+    """Return the mean frame of a motion by squared speed, columns divided by their range.
 
-    Columns are divided by their range, so that units do not matter; those that hardly move do not
-    count.
+    So units do not matter, nor columns that hardly move.
     """
     ranges = np.ptp(plan, axis=0)
     steps = np.diff(plan, axis=0) / np.maximum(ranges, 1e-3 * ranges.max() + 1e-12)
