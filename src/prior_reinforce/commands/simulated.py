@@ -219,8 +219,6 @@ class Adapt(_Reaching, OnTask):
         records: list[AdaptationRecord] = []
         for i, goal in enumerate(goals, start=1):
             view.goal(i, len(goals), goal)
-            if far := session.demonstrations.say_far_outside(goal):
-                say(console, far)
             seed = self.seed + i - 1
             eyes = recording(perception, self.out / SEEN, f"goal{i}-trial")
             session.set_goal(goal, task.tolerance)
