@@ -345,3 +345,20 @@ def test_minutes_and_seconds_are_times(tmp_path, form):
     cells = [form.format(i // 6000, i // 100 % 60, i % 100) for i in range(5990, 6010)]
     path.write_text("\n".join(["t;q", *(f"{cell};0" for cell in cells)]))
     np.testing.assert_allclose(read_table(path).stamps(0), np.arange(20) * 1e7)
+
+
+@pytest.mark.parametrize("end", ["", ","])
+def test_names_that_no_cell_is_under_in_any_row_are_refused(tmp_path, end):
+    """The last names would be of others' numbers: of a rate in the place of a joint."""
+    path = tmp_path / "a.csv"
+    path.write_text(f"q1,q2,q3,dq1,dq2,dq3\n0.1,0.2,1.1,1.2{end}\n0.3,0.4,1.3,1.4{end}\n")
+    with pytest.raises(FileFormatError, match=rf"6 names in line 1, and {4 + len(end)} cells"):
+        one(path)
+
+
+def test_rows_that_are_cut_off_at_the_end_are_read_with_empty_cells(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("t,q1,q2,\n0,0.1,0.2,\n1,0.3,0.4\n2,0.5\n")
+    assert one(path).cells[2] == ["0.2", "0.4", ""]
+    path.write_text("t,q1,q2,\n0,0.1,0.2\n1,0.3,0.4\n")
+    assert one(path).names == ("t", "q1", "q2")

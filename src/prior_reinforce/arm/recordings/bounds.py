@@ -1,7 +1,8 @@
 """How large recordings may be: checked from headers and counts, before anything is allocated.
 
 A small file can claim, or unpack to, more than any machine holds; the limits of all readers stand
-here, each far above what arms record. Every check raises FileFormatError.
+here, each far above what arms record, and that of names over too few cells. Every check raises
+FileFormatError.
 """
 
 from __future__ import annotations
@@ -79,3 +80,14 @@ def check_names(where: object, names: Iterable[object]) -> None:
                 f"{where} has a name of {len(name)} characters ({name[:20]!r}...), at most "
                 f"{LONGEST_NAME} are read; rename it"
             )
+
+
+def check_width(where: str, rows: Sequence[tuple[int, Sequence[str]]]) -> None:
+    """Refuse a first row of more texts than any numbered row below has cells."""
+    (line, first), *below = rows
+    names, cells = sum(map(bool, first)), max((len(row) for _, row in below), default=len(first))
+    if cells < names:
+        raise FileFormatError(
+            f"{where}: {names} names in line {line}, and {cells} cells under them at most, so that "
+            "a name may be over another's numbers; take the names out that no cell is of"
+        )

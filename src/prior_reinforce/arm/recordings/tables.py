@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from prior_reinforce.arm.recordings.bounds import check_bytes, check_names, check_table
+from prior_reinforce.arm.recordings.bounds import check_bytes, check_names, check_table, check_width
 from prior_reinforce.arm.recordings.recording import named_damage
 from prior_reinforce.arm.recordings.units import known_unit, split_unit
 from prior_reinforce.errors import FileFormatError
@@ -334,7 +334,8 @@ def _table(
 ) -> Table:
     """Names, units and cells of numbered rows; names may be the `title`, in a comment above."""
     above = [any(cell.lower() in head for cell in row) for _, row in rows[:_SAMPLE]]
-    rows = _of_one_width(where, rows[above.index(True) if any(above) else 0 :])
+    check_width(where, rows := rows[above.index(True) if any(above) else 0 :])
+    rows = _of_one_width(where, rows)
     first = rows[0][1]
     units: list[str | None] = [None] * len(first)
     names, named = [f"column {i}" for i in range(1, len(first) + 1)], True
