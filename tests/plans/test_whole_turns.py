@@ -5,7 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from prior_reinforce.plans.whole_turns import attitudes, euler_angles, other_form, whole_circles
+from prior_reinforce.plans.whole_turns import (
+    attitudes,
+    euler_angles,
+    leap_alone,
+    other_form,
+    whole_circles,
+)
 
 
 def test_angles_that_nothing_stops_are_known_by_name_and_unit():
@@ -54,3 +60,10 @@ def test_the_other_form_is_the_same_turn():
     vector = np.array([[0.0, 0.0, math.pi / 2], [0.0, 0.0, 0.0]])
     np.testing.assert_allclose(other_form(vector), [[0, 0, -3 * math.pi / 2], [0, 0, 0]])
     np.testing.assert_allclose(other_form(other_form(vector)), vector, atol=1e-12)
+
+
+def test_one_angle_that_leaps_alone_is_no_rotation_vector():
+    angles = np.array([[3.1, 0.1, 0.2], [3.13, 0.1, 0.2], [-3.123, 0.1, 0.2], [-3.09, 0.1, 0.2]])
+    assert leap_alone([angles])
+    assert not leap_alone([np.where(angles[:, :1] < 0, other_form(np.abs(angles)), angles)])
+    assert not leap_alone([np.abs(angles)])

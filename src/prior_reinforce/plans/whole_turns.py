@@ -19,6 +19,8 @@ TURN: Mapping[str, float] = {"rad": 2 * math.pi, "deg": 360.0}
 HALF = 0.01
 """Tolerance of a step of half a turn, as a share of a turn. Ours: what a wrist turns in one
 frame."""
+_NEAR = 0.3
+"""What is left of a leap once it is taken as one of a turn, or of a sign, in [rad]. Ours."""
 CIRCLES = r"yaw|roll|heading|azimuth?|bearing|gier(winkel)?|roll(winkel)?"
 """Names of angles without stops."""
 _OF_A_LIMB = re.compile(
@@ -82,6 +84,30 @@ def other_form(attitude: np.ndarray) -> np.ndarray:
         return -attitude
     angle = np.linalg.norm(attitude, axis=-1, keepdims=True)
     return attitude * (1 - 2 * math.pi / np.maximum(angle, 1e-9)) * (angle > 1e-9)
+
+
+def leap_alone(motions: Sequence[np.ndarray]) -> bool:
+    """Whether of three numbers one leaps by a turn and the others go on, as Euler angles do.
+
+    The numbers of a rotation vector change their sign together.
+    """
+    starts = np.array([motion[0] for motion in motions])
+    alone, together = 0.0, 0.0
+    for own, expected in ((starts, starts[:1]), *((m[1:], _expected(m)) for m in motions)):
+        off = own - expected
+        leaps = np.linalg.norm(off, axis=1) > 1
+        each = [off - TURN["rad"] * np.round(off / TURN["rad"]), other_form(own) - expected]
+        one, other = (np.linalg.norm(left[leaps], axis=1) for left in each)
+        near = np.minimum(one, other) < _NEAR  # else a motion that is neither
+        alone, together = alone + one[near].sum(), together + other[near].sum()
+    return bool(alone < together / 2)
+
+
+def _expected(motion: np.ndarray) -> np.ndarray:
+    """Each frame but the first, if the step before went on; none goes on after a leap."""
+    steps = np.diff(motion, axis=0)
+    steps[np.linalg.norm(steps, axis=1) > 1] = 0.0
+    return motion[:-1] + np.vstack([np.zeros(motion.shape[1]), steps[:-1]])
 
 
 def euler_angles(names: Sequence[str], units: Sequence[str]) -> tuple[tuple[str, str, str], ...]:

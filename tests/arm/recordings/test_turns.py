@@ -200,3 +200,38 @@ def test_joints_that_count_from_0_to_360_are_named_where_they_may_be_a_turn_too_
     _, said = brought_together(names, "deg", motions)
     assert "lift 4.36 rad, wrist 4.63 rad may be a turn too high" in said
     assert brought_together(names, "deg", [m - [40, 0, 0, 0] for m in motions])[1] == ""
+
+
+@pytest.mark.parametrize("names", [("rx", "ry", "rz"), ("act_rx", "act_ry", "act_rz")])
+@pytest.mark.parametrize("within", [True, False])
+def test_rx_ry_rz_in_radians_are_angles_where_one_leaps_alone(names, within):
+    """A rotation vector's three numbers change their sign together."""
+    true = [
+        np.array([3.1, 0.002, 0.025 if within else 0.3])
+        + S[:, None] * np.array([0.09 * within, 0, 0.2])
+        for i in range(N)
+    ]
+    for i, motion in enumerate(true):
+        motion[:, 0] += 0.06 * (i == 1) * (not within)
+    recorded = [m.copy() for m in true]
+    for motion in recorded:
+        motion[:, 0] = np.deg2rad(wrapped(np.rad2deg(motion[:, 0])))
+    read, said = brought_together(names, "rad", recorded)
+    np.testing.assert_allclose(np.deg2rad(read), true, atol=1e-9)
+    assert f"{names[0]} passes the end" in said if within else "is taken 1 turn higher" in said
+
+
+@pytest.mark.parametrize("others", [(0.002, 0.025), (1e-4, 0.0), (0.8, 0.3)])
+def test_rx_ry_rz_that_change_their_sign_together_are_a_rotation_vector(others):
+    """As UR's poses of a tool that looks down do, whatever small numbers are beside."""
+    way = np.array([3.1, *others])
+    true = way * (1 + 0.02 * S[:, None])
+    true += 1e-5 * np.random.default_rng(0).standard_normal(true.shape)
+    size = np.linalg.norm(true, axis=1, keepdims=True)
+    recorded = np.where(size > np.pi, true - 2 * np.pi * true / size, true)
+    read, _ = brought_together(("rx", "ry", "rz"), "rad", [recorded] * N)
+    same = np.linalg.norm(np.deg2rad(read[0]), axis=1)
+    assert np.abs(np.diff(np.deg2rad(read[0]), axis=0)).max() < 0.01
+    np.testing.assert_allclose(
+        np.minimum(same, 2 * np.pi - same), np.minimum(size[:, 0], 2 * np.pi - size[:, 0])
+    )

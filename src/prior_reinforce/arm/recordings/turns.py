@@ -29,6 +29,7 @@ from prior_reinforce.plans.whole_turns import (
     TURN,
     euler_angles,
     is_of_a_limb,
+    leap_alone,
     other_euler_forms,
     other_form,
 )
@@ -81,11 +82,12 @@ def aligned(
     recorded = zip(selection.names, selection.recorded_units, strict=True)
     degrees = {name for name, unit in recorded if without_number(unit)[0] == "deg"}
     # `rx`, `ry`, `rz` are a rotation vector where they are in radians, and else Euler angles.
-    euler = [{*g} for g in euler_angles(form.names, form.units) if degrees.issuperset(g)]
-    told = [g for g in form.attitudes if {*g} in euler]
-    kept = []
+    euler = [{*group} for group in euler_angles(form.names, form.units)]
+    told, kept = [], []
     for group in form.attitudes:
         own = [motion[:, [form.names.index(name) for name in group]] for motion in motions]
+        if {*group} in euler and (degrees.issuperset(group) or leap_alone(own)):
+            told.append(group)
         if len(group) == 4:
             _check_length(group, own)
         if group not in told and (len(group) == 3 or _off_length_1(own) < _NORM):
@@ -103,6 +105,7 @@ def aligned(
     new = motions[len(shown) :]
     if before is not None:
         _check_in_use(before, motions[: len(shown)], new, said)
+    told = [group for group in told if group not in form.attitudes]  # of those before
     form = replace(form, periodic=tuple(dict.fromkeys((*form.periodic, *chain(*told)))))
     recordings = tuple(
         replace(recording, positions=motion)
