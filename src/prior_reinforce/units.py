@@ -76,11 +76,11 @@ UNITS: Mapping[str, Unit] = {
     ),
     "us": Unit(
         kind="time", factor=1e-6, plural="microseconds",
-        spellings="µs μs usec usecs microsec microsecs microsecond micros",
+        spellings="µs μs usec usecs usecond useconds microsec microsecs microsecond micros",
     ),
     "ns": Unit(
         kind="time", factor=1e-9, plural="nanoseconds",
-        spellings="nsec nsecs nanosec nanosecs nanosecond nanos",
+        spellings="nsec nsecs nsecond nseconds nanosec nanosecs nanosecond nanos",
     ),
     "day": Unit(kind="time", factor=86400.0, plural="days", spellings=""),
     "min": Unit(kind="time", factor=60.0, plural="minutes", spellings="mins minute"),

@@ -320,3 +320,41 @@ def test_ticks_are_the_times_and_what_counts_down_is_refused_beside_a_rate(tmp_p
     with pytest.raises(InvalidDemonstrationsError, match="falls with every frame"):
         read_recordings(tmp_path, rate=100)
     assert read_recordings(tmp_path, rate=125, time_column="none")
+
+
+@pytest.mark.parametrize("head", ["secs,nsecs", "seconds,nseconds", "sec,nanosec"])
+def test_seconds_of_a_pair_number_no_episodes(tmp_path, head):
+    times = 0.17 + np.arange(80) / 20
+    rows = [
+        f"{1603898605 + int(t)},{round(t % 1 * 1e9)},{np.sin(t):.4f},{np.cos(t):.4f}"
+        for t in times.tolist()
+    ]
+    (tmp_path / "a.csv").write_text("\n".join([f"{head},j1,j2", *rows]))
+    (recording,) = read_recordings(tmp_path / "a.csv")
+    assert (recording.episode, recording.names) == ("a", ("j1", "j2"))
+    np.testing.assert_allclose(recording.times, np.arange(80) / 20, atol=1e-6)
+
+
+def test_dates_in_whole_seconds_number_no_episodes_and_repeat(tmp_path):
+    rows = [f"2024-09-24 14:05:{i // 25 + 10},{1210441551 + 12 * i},{i % 7}" for i in range(100)]
+    (tmp_path / "a.csv").write_text("\n".join(["Timestamp,IPOC,j1", *rows]))
+    with pytest.raises(FileFormatError, match="--time-column IPOC"):
+        read_recordings(tmp_path / "a.csv")
+    (recording,) = read_recordings(tmp_path / "a.csv", time_column="IPOC", time_unit="ms")
+    np.testing.assert_allclose(recording.times, np.arange(100) * 0.012)
+
+
+def test_days_may_number_episodes(tmp_path):
+    rows = [f"2024-09-{i // 25 + 10},{i % 25 / 50},{i % 7}" for i in range(100)]
+    (tmp_path / "a.csv").write_text("\n".join(["session,t,j1", *rows]))
+    assert len(read_recordings(tmp_path / "a.csv")) == 4
+
+
+@pytest.mark.parametrize("said", [{}, {"time_column": "none", "rate": 50.0}])
+@pytest.mark.parametrize("missing", [0, 1])
+def test_rows_of_one_joint_each_are_to_be_pivoted_whatever_the_joints(tmp_path, said, missing):
+    rows = [f"{k / 50},{name},{(k * i) % 5}" for k in range(9) for i, name in enumerate(JOINTS)]
+    text = "\n".join(["time,name,position", *rows[: len(rows) - missing]])
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(FileFormatError, match=r"pivot\(index=TIME, columns='name'"):
+        read_recordings(tmp_path / "a.csv", **said)

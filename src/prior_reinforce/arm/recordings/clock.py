@@ -348,6 +348,11 @@ def hold_together(where: str, clocks: Mapping[str, Times]) -> None:
             scales = [period / own]
         if own <= 0 or (not scales and np.all(steps == 1)):
             continue  # it counts frames, or is no clock
+        if not (scales or period > 0):
+            raise FileFormatError(
+                f"{where}: {name} repeats, as of a coarse clock, and {other} steps by {own:.4g}; "
+                f"if that is the time, say --time-column {other}, else --time-column none --rate HZ"
+            )
         if not scales:
             raise FileFormatError(
                 f"{where}: {name} says {1 / period:.4g} frames a second, but {other} steps by "

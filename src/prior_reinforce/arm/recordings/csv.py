@@ -47,7 +47,9 @@ from prior_reinforce.arm.recordings.table_times import (
     called_times,
     clock_of_table,
     counts_rows,
+    is_coarse_time,
     named_column,
+    names_rows_of_a_time,
     time_columns,
     with_whole_dates,
 )
@@ -173,7 +175,7 @@ def _throws(
     for i, cells in enumerate(table.cells):
         changes = _changes(cells)
         says = [cells[k] for k in changes]
-        if len(set(says)) < len(says) or len(says) < 2:
+        if len(set(says)) < len(says) or len(says) < 2 or is_coarse_time(table, i):
             continue
         if changes == starts:
             return i, cells, ()
@@ -336,10 +338,10 @@ def _without_other_logs(table: Table, found: Sequence[int]) -> tuple[Table, tupl
 def _refuse_text(
     table: Table, joints: Sequence[str], names: Sequence[str], found: Sequence[int]
 ) -> None:
-    """FileFormatError if joints are texts: names in a column of their own, or `True`, `False`."""
+    """FileFormatError if joints are texts: names in a column of their own, or `True`."""
     opens = Kind.TOOL in kinds(joints)
     for i, cells in enumerate(table.cells):
-        if len(joints) > 1 and {*joints} <= {*cells}:
+        if (len(joints) > 1 and {*joints} <= {*cells}) or names_rows_of_a_time(table, i):
             raise FileFormatError(
                 f"{table.where}: each row is of one joint, which {names[i]} names; write a row a "
                 "frame and a column a joint: pandas' DataFrame.pivot(index=TIME, columns="

@@ -33,6 +33,7 @@ from prior_reinforce.arm.recordings.time_finder import (
 )
 from prior_reinforce.arm.recordings.units import SECONDS, known_unit, say_names, split_unit
 from prior_reinforce.errors import ConfigurationError
+from prior_reinforce.units import NS_PER_S
 
 _DATES = ("date", "datum", "day", "fecha", "data")
 _SAYS = re.compile(
@@ -138,6 +139,27 @@ def _seconds_and_parts(table: Table) -> FoundTimes | None:
                 if np.all(whole % 1 == 0) and np.all((part >= 0) & (part < 1)):
                     return FoundTimes((i, j), unit=unit)
     return None
+
+
+def is_coarse_time(table: Table, column: int) -> bool:
+    """Whether a column is the time, or part of it, in whole seconds."""
+    if (pair := _seconds_and_parts(table)) is not None and column in pair.columns:
+        return True
+    dates = table.nanoseconds(column)
+    return dates is not None and bool(np.diff(dates).max(initial=0) <= NS_PER_S)
+
+
+def names_rows_of_a_time(table: Table, column: int) -> bool:
+    """Whether a column of texts tells the rows of each time apart, as of one joint each."""
+    texts = {*table.cells[column]}
+    if len(texts) < 2 or not table.is_text(column):
+        return False
+    for i in (i for i, name in enumerate(table.names) if says_time(name)):
+        stamps = table.stamps(i).tolist()
+        times, pairs = {*stamps}, {*zip(stamps, table.cells[column], strict=True)}
+        if len(times) > 1 and len(pairs) == len(table) > (len(times) - 1) * len(texts):
+            return True
+    return False
 
 
 def counts_rows(table: Table, column: int, times: Times) -> bool:
