@@ -207,3 +207,8 @@ def test_one_unit_is_of_all_that_can_be_in_it():
     assert one_for_all("mm", names) == ["mm"] * 8
     assert one_for_all("mm", ("j1", "lift"), ("rad", "m")) == [None, "mm"]
     assert one_for_all("percent", ("j1", "lift"), ("rad", "m")) == ["percent"] * 2
+
+
+def test_coordinates_called_like_the_attitude_beside_are_a_place_whatever_else_is_there():
+    names = ("inp_mag", "tgt_x", "tgt_y", "tgt_z", "tgt_rx", "tgt_ry", "tgt_rz")
+    assert kinds(names) == (Kind.UNKNOWN, *[Kind.PLACE] * 3, *[Kind.ROTATION] * 3)

@@ -302,6 +302,10 @@ def _place_beside_attitude(names: Sequence[str], found: Sequence[Kind]) -> Itera
     certain = attitudes(names)
     for group in (*certain, *euler_angles(names, ("rad",) * len(names))):
         columns = [names.index(name) for name in group]
+        stem = re.sub("[rq]?[wxyz]$", "", group[0])  # `act_x` beside `act_rx`, whatever else is
+        own = [names.index(stem + letter) for letter in "xyz" if stem + letter in names]
+        if len(own) == 3 and all(found[i] is Kind.UNKNOWN for i in own):
+            yield from own
         for beside in (range(min(columns))[::-1], range(max(columns) + 1, len(names))):
             place = sorted(takewhile(lambda i: found[i] is Kind.UNKNOWN, beside))
             is_xyz = all(axis in names[i].lower() for axis, i in zip("xyz", place, strict=False))

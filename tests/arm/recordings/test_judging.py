@@ -254,3 +254,10 @@ def test_counts_are_asked_about_with_what_one_is(most, unit):
     asked = select(takes(names, (most, 0.8 * most, 0.7 * most))).ambiguities
     assert {one.option for one in asked} == {"--units UNIT"}
     assert any(f"'{unit}' for" in one.what for one in asked)
+
+
+def test_speeds_of_one_recorder_are_in_one_unit():
+    names = ("pan", "vel_1_cmd", "vel_2_cmd", "vel_3_cmd")
+    (asked,) = select(takes(names, (1, 80, 9, 3))).ambiguities
+    assert asked.option == "--units rad deg/s deg/s deg/s"
+    assert select(takes(names, (1, 8, 9, 3))).ambiguities == ()

@@ -16,6 +16,7 @@ from prior_reinforce.arm.recordings.units import (
     raise_if_ambiguous,
     say_names,
     split_unit,
+    unit_of_other,
 )
 from prior_reinforce.errors import ConfigurationError, UnclearUnitsError
 from prior_reinforce.units import base_of
@@ -145,3 +146,15 @@ def test_a_unit_behind_a_number_in_any_brackets_is_one():
         name, unit = split_unit(head, CHANNEL_UNITS)
         assert (name, base_of(unit)[1]) == ("j", pytest.approx(np.pi / 180_000))
     assert split_unit("j(2)", CHANNEL_UNITS) == ("j(2)", None)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("vel_1_degps", "deg/s"), ("vel_1_rad_per_s", "rad/s"), ("w_dps", "deg/s"),
+        ("tcp_speed_mmps", "mm/s"), ("torque_4_Nm", "Nm"), ("steps", None), ("temps", None),
+        ("q_d_1", None), ("vel_1", None),
+    ],
+)  # fmt: skip
+def test_the_unit_of_a_speed_or_a_load_in_a_name(name, unit):
+    assert unit_of_other(name) == unit

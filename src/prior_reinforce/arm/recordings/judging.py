@@ -7,6 +7,7 @@ stated is asked about. What somebody stated is believed where an arm can do it, 
 
 from __future__ import annotations
 
+import re
 import shlex
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +20,7 @@ from prior_reinforce.arm.recordings.naming import vectors
 from prior_reinforce.arm.recordings.recording import Positions, Recording
 from prior_reinforce.arm.recordings.units import Ambiguity, is_possible, judge_unit, say_names
 from prior_reinforce.errors import ConfigurationError
-from prior_reinforce.plans.channels import Kind, kinds
+from prior_reinforce.plans.channels import RATES, Kind, kinds
 from prior_reinforce.plans.plan_format import PlanFormat, summed
 from prior_reinforce.plans.whole_turns import TURN
 from prior_reinforce.units import base_of
@@ -195,7 +196,12 @@ class Judge:
 
     def _looks(self, one: Belief) -> str | None:
         """The unit that a channel's numbers look like."""
-        most = max(each.largest for each in (self.places if one in self.places else [one]))
+        alike = self.places if one in self.places else [one]
+        if one.kind in RATES:  # `vel_1_cmd`, `vel_2_cmd` are of one recorder
+            called = [re.sub(r"\d+", "0", each.name) for each in self.beliefs]
+            mine = re.sub(r"\d+", "0", one.name), one.stated
+            alike = [e for e, n in zip(self.beliefs, called, strict=True) if (n, e.stated) == mine]
+        most = max(each.largest for each in alike)
         looks = judge_unit(one.unit, most, opening=one.kind is Kind.TOOL)
         return "mm" if looks == "cm" != one.unit else looks  # cm are people's; machines log mm
 

@@ -17,7 +17,13 @@ from jaxtyping import Float
 from prior_reinforce.arm.recordings.bounds import check_names
 from prior_reinforce.arm.recordings.clock import Clock
 from prior_reinforce.arm.recordings.time_finder import Times, is_set_back
-from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, Ambiguity, say_names, split_unit
+from prior_reinforce.arm.recordings.units import (
+    CHANNEL_UNITS,
+    Ambiguity,
+    say_names,
+    split_unit,
+    unit_of_other,
+)
 from prior_reinforce.arrays import Point
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError, PriorReinforceError
 from prior_reinforce.files import without_advice
@@ -222,7 +228,7 @@ def without_units(names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str | No
             break
     else:
         bare = tuple(names)
-    return bare, tuple(unit for _, unit in split)
+    return bare, tuple(unit or unit_of_other(name) for name, unit in split)
 
 
 @contextmanager

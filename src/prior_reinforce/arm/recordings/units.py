@@ -59,6 +59,8 @@ _NO_ENDING = {
 """Words that are no unit there: in `plug_in`, `q_min`, `firstDay`."""
 _BEFORE_NUMBER = re.compile(r"(?P<name>.+?)_(?P<unit>deg|rad|mm|cm)(?P<number>_?\d+)", re.I)
 """`q_deg_0`."""
+_OF_OTHERS = re.compile(r".+_(?:(?P<of>deg|rad|mm|m|d)_?p(?:er_?)?s(?:ec)?|(?P<load>Nm))", re.I)
+"""`vel_1_degps`, `torque_1_Nm`: no angles, which keep their whole names."""
 _UNKNOWN = re.compile(r"(?P<name>.+?)\s*\[\s*(?P<unit>[^\[\]]*[^\W\d_][^\[\]]*?|%)\s*\]")
 """`pressure [bar]` or `x [cm ahead]`, in an unknown unit: what holds a letter, unlike `x[0]`."""
 
@@ -118,6 +120,15 @@ def split_unit(
             return match["name"].strip(), match["unit"]
     match = _UNKNOWN.fullmatch(column.strip()) if any_word else None
     return (match["name"], spelt(match["unit"]) or match["unit"]) if match else (column, None)
+
+
+def unit_of_other(column: str) -> str | None:
+    """Return the unit of a speed or a load in a name, `vel_1_degps`; None where it says none."""
+    match = _OF_OTHERS.fullmatch(column.strip())
+    if match is None:
+        return None
+    of = (match["of"] or "").lower()
+    return "Nm" if match["load"] else f"{'deg' if of == 'd' else of}/s"
 
 
 def conversion(recorded: str, wanted: str, name: str) -> float:
