@@ -247,6 +247,11 @@ READ = [
         arm(SIX, limit='effort="9" drake:acceleration="9"'),
         name='name="a" xmlns:drake="http://drake.mit.edu"',
     ),
+    Urdf(
+        "drake's acceleration, whose prefix nobody declared",
+        arm(SIX, limit='effort="9" drake:acceleration="9"'),
+        before=f"{HEAD}<!-- see: drake.mit.edu -->\n",
+    ),
     Urdf("acceleration and jerk", arm(SIX, limit='acceleration="8" deceleration="8" jerk="400"')),
     Urdf("deceleration alone", arm(SIX, limit='deceleration="8"')),
     Urdf("another word in <limit>", arm(SIX, limit='stiffness="3"')),
@@ -352,9 +357,6 @@ REFUSED = [
         arm(SIX),
         change=("joint3", "${prefix}joint3"),
         says="xacro arm.urdf.xacro",
-    ),
-    Urdf(
-        "a prefix nobody declared", arm(SIX, limit='drake:acceleration="9"'), says="unbound prefix"
     ),
     Urdf(
         "a link that is not there",

@@ -19,6 +19,7 @@ from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
 from xml.etree import ElementTree
+from xml.parsers.expat import errors
 
 import numpy as np
 
@@ -64,6 +65,10 @@ LARGEST = {"velocity": _FASTEST, **RATES}
 """What no joint does, in rad and s."""
 BESIDE = 0.01
 """By how much a joint may be held beyond its range, [rad] or [m] (ours): two written digits."""
+_UNBOUND = errors.codes[errors.XML_ERROR_UNBOUND_PREFIX]
+_PREFIX = re.compile(rb"[\s<]([A-Za-z_][\w.-]*):[A-Za-z_]")
+_DECLARED = re.compile(rb"xmlns:([\w.-]+)")
+"""Prefixes that are used, and those that are declared."""
 _WEB_PAGE = (b"<!doctype html", b"<html")
 """Beginnings of what a browser saves in the place of a file, in lower case."""
 _OTHER_FORMATS = {"mujoco": "MuJoCo's format", "sdf": "SDF"}
@@ -90,7 +95,7 @@ def read_joints(path: Path) -> tuple[str, list[Joint], list[str], dict[str, str]
         with path.open("rb") as file:
             if file.read(_LONGEST_NAME).lstrip().lower().startswith(_WEB_PAGE):
                 raise FileFormatError(f"{path} is a web page; download the file that it shows")
-        root = ElementTree.parse(path, ElementTree.XMLParser(target=_Builder())).getroot()
+        root = _root_of(path.read_bytes())
         joints = _joints_of(root, path)
         links = _links_of(root, joints)
         return root.get("name") or path.stem, joints, links, _meshes_of(root, joints)
@@ -312,6 +317,19 @@ class Joint:
                 f"{low:.4g} to {high:.4g} in its <limit>; mend its soft limits, or take it out"
             )
         return lowest, highest
+
+
+def _root_of(content: bytes) -> ElementTree.Element:
+    """The root element; prefixes that no line declares, as Drake's, are declared by their names."""
+    try:
+        return ElementTree.fromstring(content, ElementTree.XMLParser(target=_Builder()))
+    except ElementTree.ParseError as error:
+        if error.code != _UNBOUND:
+            raise
+    prefixes = {*_PREFIX.findall(content)} - {b"xml", b"xmlns", *_DECLARED.findall(content)}
+    declared = b"".join(b' xmlns:%s="%s"' % (prefix, prefix) for prefix in sorted(prefixes))
+    content = content.replace(b"<robot", b"<robot" + declared, 1)
+    return ElementTree.fromstring(content, ElementTree.XMLParser(target=_Builder()))
 
 
 class _Builder(ElementTree.TreeBuilder):
