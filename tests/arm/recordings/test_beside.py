@@ -170,3 +170,10 @@ def test_commands_of_single_names_are_asked_about_beside_what_was_measured():
     assert asked.option == "--joints shoulder elbow grip goal_x"
     assert not asked.guessed
     assert [*twin_vectors(["cmd_elbow", "cmd_pan", "wrist"], Q)] == []
+
+
+def test_a_number_that_stands_still_is_proposed_for_no_motion():
+    names = [*(f"q_{i}" for i in range(Q.shape[1])), *(f"tq_{i}" for i in range(Q.shape[1]))]
+    values = np.column_stack([Q, Q + 0.001, np.full(len(Q), 7.0), S])
+    (asked,) = twin_vectors([*names, "robot_mode", "grip"], values)
+    assert asked.option == "--key WHICH --key grip"

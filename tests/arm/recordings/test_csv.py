@@ -717,3 +717,25 @@ def test_an_offset_and_the_rate_of_a_control_are_no_channels(tmp_path):
     assert any(all(name in remark for name in others) for remark in read.remarks)
     (named,) = read_recordings(tmp_path, joints=("joint1", "control_rate"))
     assert named.names == ("joint1", "control_rate")
+
+
+def test_a_key_is_the_name_before_the_number_and_the_unit(tmp_path):
+    t, q = sampled(0, 50)
+    names = [f"{of}_revolute_{i}_deg" for i in range(q.shape[1]) for of in ("cmd", "pos")]
+    table = np.column_stack([t, np.repeat(q, 2, axis=1)])
+    table[:, 1::2] += 0.1
+    head = ",".join(["t", *names])
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header=head, comments="")
+    (read,) = read_recordings(tmp_path, key=("pos_revolute",))
+    np.testing.assert_allclose(read.positions, q)
+    assert {*read.units} == {"deg"}
+
+
+def test_several_numbers_in_a_cell_are_told_as_such(tmp_path):
+    rows = [f'{k / 50},"{k},{k**2},0.5",{k % 3},open' for k in range(9)]
+    (tmp_path / "a.csv").write_text("\n".join(["t,joint_positions,grip,state", *rows]))
+    (read,) = read_recordings(tmp_path)
+    assert any("joint_positions" in remark and "brackets" in remark for remark in read.remarks)
+    bracketed = (tmp_path / "a.csv").read_text().replace(',"', ',"[').replace('",', ']",')
+    (tmp_path / "a.csv").write_text(bracketed)
+    assert len(read_recordings(tmp_path)[0].names) == 4

@@ -612,3 +612,13 @@ def test_columns_without_names(tmp_path):
         InvalidDemonstrationsError, match="3 columns without names, and the plan 2 joints"
     ):
         import_demonstrations(tmp_path / "all.npz", joints="xy", **options)
+
+
+def test_times_that_leap_are_told_before_the_frames_that_they_make():
+    times = np.concatenate([[0.0], 2233.5 + np.arange(200) / 100])
+    motion = np.column_stack([np.sin(times), np.cos(times)])
+    recording = Recording("a", times, motion, ("pan", "lift"))
+    with pytest.raises(InvalidDemonstrationsError, match=r"leap by 2234 s at frame 1"):
+        preprocess(
+            [recording], PlanFormat(("pan", "lift"), ("rad", "rad"), 0.0125), Preprocessing()
+        )

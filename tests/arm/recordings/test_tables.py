@@ -362,3 +362,19 @@ def test_rows_that_are_cut_off_at_the_end_are_read_with_empty_cells(tmp_path):
     assert one(path).cells[2] == ["0.2", "0.4", ""]
     path.write_text("t,q1,q2,\n0,0.1,0.2\n1,0.3,0.4\n")
     assert one(path).names == ("t", "q1", "q2")
+
+
+def test_the_names_of_a_head_of_several_lines_begin_with_its_first(tmp_path):
+    path = tmp_path / "a.csv"
+    heads = "Recorded at ,Wed Oct 28\n\nStamp,Position,Velocity\nseconds,elbow,elbow,\n"
+    path.write_text(f"{heads}0.1,0.2,0.3,\n0.2,0.3,0.4,\n")
+    with pytest.raises(FileFormatError, match="names are in line 3"):
+        one(path)
+
+
+def test_yaml_is_called_so(tmp_path):
+    path = tmp_path / "a.txt"
+    frame = "header:\n  stamp:\n    sec: 1\nname:\n- elbow\nposition:\n- 0.25\n---\n"
+    path.write_text(frame * 3)
+    with pytest.raises(FileFormatError, match=r"is YAML.*--csv"):
+        one(path)

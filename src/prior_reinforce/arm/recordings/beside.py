@@ -131,7 +131,8 @@ def twin_vectors(names: Sequence[str], values: Positions) -> Iterator[Ambiguity]
             measured = measured_of([one, other])
             seen = f"it looks as if {measured} were measured" if measured else "name what was"
             in_vectors = {i for group in vectors(names).values() for i in group}
-            single = [name for i, name in enumerate(names) if i not in in_vectors]
+            alone = [i for i in range(len(names)) if i not in in_vectors and _moves(values[:, i])]
+            single = [names[i] for i in alone]
             keys = " ".join(f"--key {shlex.quote(key)}" for key in (measured or "WHICH", *single))
             what = f"{other} repeats {one}, as a command does: {seen}"
             yield Ambiguity(what, keys, guessed=False)

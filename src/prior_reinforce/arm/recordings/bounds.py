@@ -83,7 +83,12 @@ def check_names(where: object, names: Iterable[object]) -> None:
 
 
 def check_width(where: str, rows: Sequence[tuple[int, Sequence[str]]]) -> None:
-    """Refuse a first row of more texts than any numbered row below has cells."""
+    """Refuse a first row of more texts than any numbered row below has cells, and YAML."""
+    if any(row == ["---"] for _, row in rows):
+        raise FileFormatError(
+            f"{where} is YAML, as ros2 topic echo prints it, and no table: record a bag, or print "
+            "it with --csv"
+        )
     (line, first), *below = rows
     names, cells = sum(map(bool, first)), max((len(row) for _, row in below), default=len(first))
     if cells < names:

@@ -64,6 +64,8 @@ IN_TEXT = (".txt", ".dat", ".log")
 """Read where nothing else is there, because much else has such names."""
 _ABSENT = 9e9
 """What ABB writes for the position of an axis that is not there."""
+_SEVERAL = re.compile(r"[-+.\deE]+(\s*[,;\s]\s*[-+.\deE]+)+")
+"""`0.1,0.2`, in a cell."""
 _MOST_WORDS = 8
 """Texts between which a column switches. Ours."""
 _FEW_FILES = 4
@@ -279,6 +281,8 @@ def _episode(
         texts = [i for i in texts if 1 < len({*table.cells[i]} - {""}) <= _MOST_WORDS]
     no_channel = [i for i in channels if plain and says_no_channel(called[i])]
     no_channel *= len(no_channel) < len(channels)
+    filled = {i: [*filter(None, table.cells[i])] for i in texts}
+    lists = [i for i, own in filled.items() if own and all(map(_SEVERAL.fullmatch, own))]
     absent = [i for i in channels if found is None and np.all(table.values[:, i] == _ABSENT)]
     of_flags = [i for i in others if table.named and _is_flag(called[i])]
     flags = {i: _flag(table, i) for i in of_flags}
@@ -286,7 +290,8 @@ def _episode(
         ([*flags, *no_channel], "is no joint by its name"),
         (absent, "is 9E+09 all along, as ABB writes of an axis that is not there"),
         (rising, "rises with every row, as times and counters do"),
-        ([i for i in texts if i not in flags], "holds no number"),
+        (lists, "holds several numbers in a cell; write a column a number, or lists in brackets"),
+        ([i for i in texts if i not in {*flags, *lists}], "holds no number"),
     ):
         channels = [i for i in channels if i not in left]
         remarks += [f"{say_names([called[i] for i in left])} left out, which {why}"] * bool(left)
@@ -410,7 +415,7 @@ def _by_key(
     """Columns of the motion by the name before their numbers; by their own, those beside them."""
     refuse_rates(table.where, keys, joints)
     names = [table.names[i] for i in others]
-    groups = vectors(names)
+    groups = vectors(without_units(names)[0]) | vectors(names)
     columns = []
     for key in keys:
         if key not in groups and key not in names:

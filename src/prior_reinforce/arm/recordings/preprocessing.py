@@ -405,9 +405,13 @@ def _resample(
     t, q = recording.times, recording.positions
     count = max(2, math.ceil((end - start) / dt - _ON_GRID) + 1)
     if count > _MOST_FRAMES:
+        steps = np.diff(t)
+        k = int(np.argmax(steps))
+        remedy = "give a larger dt, or cut the recording"
+        if steps[k] > (end - start) / 2:
+            remedy = f"its times leap by {steps[k]:.4g} s at frame {k + 1}: cut it there"
         raise InvalidDemonstrationsError(
-            f"episode {recording.episode} makes {count} frames at dt {dt:g} s; give a larger dt, "
-            "or cut the recording"
+            f"episode {recording.episode} makes {count} frames at dt {dt:g} s; {remedy}"
         )
     grid = start + np.arange(count) * dt
     nearest = np.clip(np.searchsorted(t, grid - dt / 2), 0, len(t) - 1)

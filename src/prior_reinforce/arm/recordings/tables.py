@@ -395,8 +395,8 @@ def _numbers_columns(where: str, first: list[str], body: list[list[str]], decima
 def _of_one_width(where: str, rows: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
     """Rows as wide as the first; FileFormatError names one that holds more cells."""
     width, names = max(len(row) for _, row in rows), len(rows[0][1])
-    numbers = [any(re.match(r"[-+.]?\d", cell) for cell in row) for _, row in rows[:_SAMPLE]]
-    head = next((i for i, own in enumerate(numbers) if own and len(rows[i][1]) == width), 0) - 1
+    full = [max((k for k, c in enumerate(row, 1) if c), default=0) for _, row in rows[:_SAMPLE]]
+    head = full.index(max(full))
     for line, row in rows:
         if any(row[names:]):
             why = "where a comma is the decimal sign, put semicolons between cells"
@@ -404,7 +404,7 @@ def _of_one_width(where: str, rows: list[tuple[int, list[str]]]) -> list[tuple[i
                 why += "; of R, write it with col.names = NA"
             if any(cell.endswith(";") for cell in row):
                 why = "numbers alone in the cells, and units in the head, x [m]"
-            if head > 0 and not numbers[head] and len(rows[head][1]) == width:
+            if head > 0 and not any(re.match(r"[-+.]?\d", cell) for cell in rows[head][1]):
                 why = f"if the names are in line {rows[head][0]}, take out all that is above them"
             raise FileFormatError(
                 f"{where}, line {line}: {len(row)} cells under {names} names; name every column, "
