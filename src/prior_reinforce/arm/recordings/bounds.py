@@ -89,7 +89,7 @@ def check_width(where: str, rows: Sequence[tuple[int, Sequence[str]]]) -> None:
             f"{where} is YAML, as ros2 topic echo prints it, and no table: record a bag, or print "
             "it with --csv"
         )
-    (line, first), *below = rows
+    (line, first), *below = rows or [(1, [])]
     names, cells = sum(map(bool, first)), max((len(row) for _, row in below), default=len(first))
     if cells < names:
         raise FileFormatError(

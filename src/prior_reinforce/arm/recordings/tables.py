@@ -195,6 +195,7 @@ def _read_csv(
     check_table(path, len(data), widest)
     cells = _split((f"{line}\n" for _, line in data), delimiter, strict=True)
     rows = [(data[cells.line_num - 1][0], [cell.strip() for cell in row]) for row in cells]
+    check_width(str(path), [] if head else rows)  # of outcomes, a short line is named
     above = [line for i, line in kept if i == data[0][0] - 1 and (i, line) not in data]
     title = (
         [c.strip() for c in next(_split([above[0].lstrip(" #%/")], delimiter), [])] if above else []
@@ -334,8 +335,7 @@ def _table(
 ) -> Table:
     """Names, units and cells of numbered rows; names may be the `title`, in a comment above."""
     above = [any(cell.lower() in head for cell in row) for _, row in rows[:_SAMPLE]]
-    check_width(where, rows := rows[above.index(True) if any(above) else 0 :])
-    rows = _of_one_width(where, rows)
+    rows = _of_one_width(where, rows[above.index(True) if any(above) else 0 :])
     first = rows[0][1]
     units: list[str | None] = [None] * len(first)
     names, named = [f"column {i}" for i in range(1, len(first) + 1)], True
