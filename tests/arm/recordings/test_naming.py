@@ -124,7 +124,7 @@ def test_numbers_are_found_and_what_cannot_be_parsed_is_none():
     texts, numbers = said_in(
         {"meta": {"a": {"fps": 50}, "b": True}, "x": "{half", "y": "[" * 10**5}
     )
-    assert numbers == {"meta.a.fps": 50}
+    assert numbers == {"meta.a.fps": 50, "meta.b": True}
     assert "x" not in texts
 
 

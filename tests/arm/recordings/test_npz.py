@@ -410,3 +410,8 @@ def test_an_episode_that_is_flagged_as_failed_is_said(tmp_path):
     np.savez(tmp_path / "one.npz", t=t, q=motions[0], meta=json.dumps({"success": False}))
     (one,) = read_recordings(tmp_path / "one.npz")
     assert any("meta.success" in remark for remark in one.remarks)
+
+
+def test_a_flag_of_the_joints_is_no_name_of_one(tmp_path):
+    said = json.dumps({"joint_names_known": True})
+    assert not read_one(tmp_path, q=Q[:, 0], meta=said, key=("q",), rate=50).named

@@ -131,7 +131,7 @@ def _search(place: str, said: Any, depth: int = _DEEPEST) -> Iterator[tuple[str,
     elif isinstance(said, str) and said.lstrip()[:1] == "{":
         return
     elif isinstance(said, (int, float, str)):
-        yield place, str(said) if isinstance(said, bool) else said
+        yield place, said
     elif isinstance(said, (list, tuple)):
         groups = said and all(isinstance(one, list) for one in said)
         yield place, [*chain(*said)] if groups else [*said]
