@@ -679,6 +679,23 @@ def test_a_recording_that_is_flagged_as_failed_is_said(tmp_path, by):
     assert told == [False, True]
 
 
+@pytest.mark.parametrize("of_one_table", [True, False])
+def test_a_json_of_all_recordings_flags_each_by_its_name(tmp_path, of_one_table):
+    t, q = sampled(0, 50)
+    frames = pd.DataFrame(np.column_stack([t, q]), columns=["t", *JOINTS])
+    throws = {f"throw_{i}": frames for i in range(3)}
+    if of_one_table:
+        table = pd.concat([own.assign(episode=name) for name, own in throws.items()])
+        throws = {"throws": table}
+    for name, own in throws.items():
+        own.to_csv(tmp_path / f"{name}.csv", index=False)
+    said = {"throw_0": {"success": True}, "throw_2": {"outcome": {"success": False}}}
+    (tmp_path / "throws.json").write_text(json.dumps(said))
+    read = read_recordings(tmp_path)
+    assert [one.episode[-1] for one in read] == ["0", "1", "2"]
+    assert [any("--leave-out" in r for r in one.remarks) for one in read] == [False, False, True]
+
+
 @pytest.mark.parametrize(
     ("name", "said", "unit"),
     [

@@ -114,10 +114,11 @@ def read(source: Path, options: ReadOptions) -> Episodes:
                 )
             column, names, guessed = _throws(table, path.stem, options, alone=len(paths) == 1)
         rows = names.count("")
-        remarks = [f"{rows} rows left out, which are of no episode"] * (0 < rows < len(names))
-        remarks += failed(table, beside)
+        left = (f"{rows} rows left out, which are of no episode",) * (0 < rows < len(names))
         for episode in sorted({*names} - {""} or {""}, key=natural_order):
             own = table.rows([i for i, name in enumerate(names) if name == episode])
+            others = {*stems, *names} - {path.stem, episode}
+            remarks = (*left, *failed(table, beside, others))
             how = episode, options, column, guessed, remarks
             guarded = or_leave_out(path.stem, partial(_has_other_columns, path, paths, options))
             yield episode, guarded(partial(_episode, own, *how))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -107,11 +107,16 @@ def headed(table: Table, beside: Beside, joints: Sequence[str] | None = None) ->
     return replace(table, names=names, units=units, named=True)
 
 
-def failed(table: Table, beside: Beside) -> Iterator[str]:
-    """Remark on what calls a table's motion failed, in its comments or a JSON beside it."""
+def failed(table: Table, beside: Beside, others: Collection[str]) -> Iterator[str]:
+    """Remark on what calls a table's motion failed, in its comments or a JSON beside it.
+
+    What the JSON says under the name of another recording is of that one.
+    """
     found = filter(None, map(_COMMENT.fullmatch, table.comments))
     comments = {match[1]: match[2] for match in found}
-    return failures({**comments, **beside.texts, **beside.numbers})
+    said = {**beside.texts, **beside.numbers}
+    own = {place: one for place, one in said.items() if {*others}.isdisjoint(place.split("."))}
+    return failures({**comments, **own})
 
 
 def with_heads(table: Table) -> Table:
