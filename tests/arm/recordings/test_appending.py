@@ -167,6 +167,9 @@ def test_a_throw_that_is_there_smoothed_or_cut_elsewhere_is_not_appended(noise):
     )
     with pytest.raises(InvalidDemonstrationsError, match=r"^a, b landed .*--leave-out a b;"):
         appended(before, again, ["a", "b", "c"])
+    every = demonstrations(names, "rad", lambda i: motion(i) + 1e-5)
+    with pytest.raises(InvalidDemonstrationsError, match=r"nothing to append; .* without --append"):
+        appended(before, every, [f"n{i}" for i in range(N)])
     others = demonstrations(names, "rad", motion, first=N)
     assert appended(before, others, ["a", "b", "c"]).n == 2 * N
     other = demonstrations(names, "rad", lambda i: motion(i) * [1, 1, -1])

@@ -69,10 +69,12 @@ def appended(
         raise InvalidDemonstrationsError(twice)
     again = [name for i, name in enumerate(episodes) if _is_there(before, more, i)]
     if again:
+        drop = "there is nothing to append"
+        drop = f"--leave-out {shlex.join(again)}" if len(again) < len(episodes) else drop
         raise InvalidDemonstrationsError(
             f"{listed(again)} landed where demonstrations so far did to the last digit, after the "
-            "same motion: if they are these throws again, smoothed or cut elsewhere, --leave-out "
-            f"{shlex.join(again)}; or import all anew without --append"
+            f"same motion: if they are these throws again, smoothed or cut elsewhere, {drop}; else "
+            "import all anew without --append"
         )
     both: dict[str, Any] = {
         name: np.concatenate([getattr(before, name), getattr(more, name)])
