@@ -7,6 +7,7 @@ import pytest
 
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.selection import select
+from prior_reinforce.arm.recordings.units import Ambiguity
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
 from tests.arm.recordings.recorded import JOINTS, sampled, takes
 
@@ -216,3 +217,21 @@ def test_a_recording_is_to_be_left_out_only_where_another_has_the_joints():
     one = Recording("t2", T, recording().positions, clear)
     with pytest.raises(InvalidDemonstrationsError, match=r"--joints; .*--leave-out t0$"):
         select([*unclear, one], ["elbow"])
+
+
+@pytest.mark.parametrize(
+    ("option", "guessed", "asked"),
+    [
+        ("--joints j1", False, 0),
+        ("--key q", False, 0),
+        ("--time-unit ms", False, 1),
+        ("--joints j1 j2", True, 1),
+    ],
+)
+def test_units_are_asked_about_once_it_is_settled_which_columns_are_the_motion(
+    option, guessed, asked
+):
+    (one,) = takes(("j1", "j2"), (90, 80))
+    assert len(select([one]).ambiguities) == 1
+    unclear = replace(one, ambiguities=(Ambiguity("", option, guessed),))
+    assert len(select([unclear]).ambiguities) == asked

@@ -144,7 +144,7 @@ def select(
     if given:
         remarks = [*(doubt.what for doubt in differ), *remarks]
     else:
-        questions = [*unsaid, *differ, *questions]
+        questions = [] if _are_unsettled(recordings) else [*unsaid, *differ, *questions]
     recorded, wanted = judge.recorded(), tuple(belief.wanted for belief in beliefs)
     scale = [conversion(*each) for each in zip(recorded, wanted, names, strict=True)]
     moving = moving_beside(picked)
@@ -163,6 +163,12 @@ def select(
         other,
         listed(left_out, "; "),
     )
+
+
+def _are_unsettled(recordings: Sequence[Recording]) -> bool:
+    """Whether it is asked which columns the motion is: of which units is then not yet."""
+    asked = [one for r in recordings for one in r.ambiguities if not one.guessed]
+    return any(one.option.startswith(("--joints", "--key")) for one in asked)
 
 
 def _are_all_columns(
