@@ -705,6 +705,8 @@ def test_a_json_of_all_recordings_flags_each_by_its_name(tmp_path, of_one_table)
         ("config", {"units": "deg", "names": ["j1", "j2"]}, "deg"),
         ("config", {"units": {"j1": "deg", "j2": "deg"}}, "deg"),
         ("recording_info", {"units": "deg"}, "deg"),
+        ("robot", {"units": "deg"}, "deg"),
+        ("setup", {"joint_units": "deg"}, "deg"),
         ("recording_info", {"limits": {"units": "deg"}}, None),
     ],
 )
@@ -721,6 +723,17 @@ def test_a_json_of_something_else_names_no_columns(tmp_path):
     (tmp_path / "panel.json").write_text(json.dumps({"column_labels": list("abcdefg")}))
     (read,) = read_recordings(tmp_path, rate=100)
     assert not read.named
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("config", {"robot": {"joint_names": JOINTS}}), ("schema", {"columns": JOINTS})],
+)
+def test_a_json_alone_that_names_joints_names_the_columns(tmp_path, name, said):
+    np.savetxt(tmp_path / "throw_0.csv", sampled(0, 100)[1], delimiter=",")
+    (tmp_path / f"{name}.json").write_text(json.dumps(said))
+    (read,) = read_recordings(tmp_path, rate=100)
+    assert read.names == JOINTS
 
 
 def test_an_offset_and_the_rate_of_a_control_are_no_channels(tmp_path):

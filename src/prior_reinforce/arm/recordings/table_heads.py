@@ -37,10 +37,13 @@ _UNIT_OF_ALL = re.compile(
 s, q in deg`, `# deg`; no `camera angles in deg`, and no `angle [deg]: 30`."""
 _OF_RECORDINGS = re.compile(
     r"((meta|data|info|set|records?|recordings?|columns?|channels?|joints?|angles?|names?|units?|log"
-    r"|throws?|demos?|demonstrations?|episodes?|trials?|session|motions?)[ _-]?)+",
+    r"|throws?|demos?|demonstrations?|episodes?|trials?|session|motions?|robot|arm|csv|tables?|header"
+    r"|schema|fields?|experiment)[ _-]?)+",
     re.IGNORECASE,
 )
 """What a JSON is called that is of all recordings beside it; a `camera_info.json` is not."""
+_OF_JOINTS = re.compile(r"(^|[._])joint_?(names?|units?)$", re.IGNORECASE)
+"""What says whatever a JSON is called that it is of joints: `joint_names`."""
 _COMMENT = re.compile(r"[#%/;\s]*(\w[\w .]*?)\s*[:=]\s*(\w+)\W*")
 """`# success: false`"""
 _MOST_SAID = 1_000_000
@@ -60,7 +63,7 @@ def said_beside(table: Table, joints: Sequence[str] | None = None) -> Beside:
     """Return what a JSON beside a table says.
 
     It is called as the table; or it is the only one of the folder, and its name says that it is of
-    recordings, or it names columns of the table, or joints.
+    recordings, or it names columns of the table, or names joints or their units.
     """
     path = Path(table.where)
     own = path.with_suffix(".json")
@@ -70,7 +73,8 @@ def said_beside(table: Table, joints: Sequence[str] | None = None) -> Beside:
         texts, numbers = said_in({"": found[0].read_bytes()})
         said = {*chain(*texts.values()), *(key.rpartition(".")[2] for key in texts)}
         named = [name for name in {*table.names, *(joints or ())} & said if not says_time(name)]
-        if own.is_file() or len(named) > 1 or _OF_RECORDINGS.fullmatch(found[0].stem):
+        of_table = own.is_file() or len(named) > 1 or any(map(_OF_JOINTS.search, texts))
+        if of_table or _OF_RECORDINGS.fullmatch(found[0].stem):
             return Beside(found[0], texts, numbers)
     return Beside(path, {}, {})
 
