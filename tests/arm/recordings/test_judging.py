@@ -230,6 +230,11 @@ def test_joints_that_all_fill_a_range_were_normalised():
     assert select(some, units=["rad"]).ambiguities == ()
     one = [replace(r, positions=r.positions * [1, 0.9, 1.1]) for r in some]
     assert select(one).ambiguities == ()
+    still = np.full((len(t), 2), -0.5)
+    held = [np.column_stack([r.positions[:, :2], still]) for r in some]
+    held = [Recording(r.episode, t, q, (*names, "roll")) for r, q in zip(some, held, strict=True)]
+    (asked,) = select(held).ambiguities
+    assert asked.option == "--units UNIT UNIT rad rad"
 
 
 def test_joints_of_a_mean_of_0_and_a_deviation_of_1_were_normalised():

@@ -66,8 +66,8 @@ class Belief:
     """Unit in the plan."""
     reach: Mapping[str, float]
     """Largest number of each take, by its name."""
-    least: float = 0.0
-    """Least number of all takes."""
+    ends: tuple[float, float] = (0.0, 0.0)
+    """Least and greatest number of all takes."""
     normal: bool = False
     """Whether its numbers are as those that were brought into a range, or to a mean of 0."""
 
@@ -117,13 +117,14 @@ def beliefs_of(
     reach = np.array([np.abs(pose).max(axis=0) for pose in poses])
     takes = [r.episode for r in recordings]
     every = np.concatenate([r.positions for r in recordings])
-    normal, least = _are_normal(every).tolist(), every.min(axis=0).tolist()
+    normal = _are_normal(every).tolist()
+    ends = list(zip(every.min(axis=0).tolist(), every.max(axis=0).tolist(), strict=True))
     beliefs = []
     for i, (name, kind, said) in enumerate(zip(names, kinds(names), stated, strict=True)):
         usual = base_of(said or kind.usual_unit(reach[:, i].max()))[0]
         wanted = plan_units[i] if plan_units else usual
         own = dict(zip(takes, reach[:, i].tolist(), strict=True))
-        beliefs.append(Belief(name, kind, said, wanted, own, least[i], normal[i]))
+        beliefs.append(Belief(name, kind, said, wanted, own, ends[i], normal[i]))
     return beliefs
 
 
@@ -208,7 +209,7 @@ class Judge:
     @cached_property
     def _normalised(self) -> list[Belief]:
         """Angles without a unit that were normalised: two or more, and most of those that move."""
-        moving = [one for one in self.angles if one.least < one.largest]
+        moving = [one for one in self.angles if one.ends[0] < one.ends[1]]
         normal = [one for one in moving if one.normal and one.stated is None]
         return normal if 2 * len(normal) > len(moving) > 1 else []
 
@@ -219,7 +220,7 @@ class Judge:
     def _is_below(self, one: Belief) -> Doubt | None:
         """A share of an opening is never below 0: -1 is an end of a range that is -1 to 1."""
         is_share = one.kind is Kind.TOOL and one.unit == "percent" and one.stated is None
-        below = is_share and one.least <= -_BELOW_0 * max(one.largest, 1)
+        below = is_share and one.ends[0] <= -_BELOW_0 * max(one.largest, 1)
         return Doubt(UNIT, _BELOW) if below else None
 
     def _may_slide(self, one: Belief) -> Doubt | None:
