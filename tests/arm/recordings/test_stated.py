@@ -271,6 +271,7 @@ def test_other_flags_call_nothing_failed(flag):
     assert [*failures(flag)] == []
 
 
+@pytest.mark.parametrize("key", ["actions", "Action"])
 @pytest.mark.parametrize(
     ("actions", "measured"),
     [
@@ -279,15 +280,15 @@ def test_other_flags_call_nothing_failed(flag):
         (np.gradient(Q, axis=0), {"states": Q, "dq": Q}),
     ],
 )
-def test_actions_that_a_controller_scales_are_no_positions(actions, measured):
-    arrays = {"actions": actions, **measured}
+def test_actions_that_a_controller_scales_are_no_positions(key, actions, measured):
+    arrays = {key: actions, **measured}
 
     def read(**how):
         options = ReadOptions(rate=50, joints=UR, **how)
-        return recorded_among(Path("a.npz"), "a", ["actions"], arrays, options, texts={})
+        return recorded_among(Path("a.npz"), "a", [key], arrays, options, texts={})
 
-    key = "--key states" if measured else "--key;"
-    with pytest.raises(FileFormatError, match=rf"{key}.*--units rad"):
+    by_key = "--key states" if measured else "--key;"
+    with pytest.raises(FileFormatError, match=rf"{by_key}.*--units rad"):
         read()
     np.testing.assert_array_equal(read(units=["rad"]).positions, actions)
 

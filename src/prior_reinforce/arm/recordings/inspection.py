@@ -320,9 +320,7 @@ def inspect(selection: Selection, wanted: Wanted) -> Inspection:
     try:
         selection, form = aligned(selection, robot, before)
     except InvalidDemonstrationsError:
-        raise_if_ambiguous(
-            selection.ambiguities, take_guesses=True
-        )  # counts taken for radians leap
+        raise_if_ambiguous(selection.ambiguities, take_guesses=True)  # counts, for radians, leap
         raise
     how = wanted.preprocessing or Preprocessing()
     processed = preprocess(selection.recordings, form, how)

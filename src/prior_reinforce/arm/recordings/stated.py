@@ -68,7 +68,7 @@ if that is more. Ours: sound has more."""
 _FAR_OFF, _SLACK = 5.0, 0.01
 """Standard deviations by which the middle of a motion is off what is said of its mean, and rounding
 of what is said. Ours: a motion is one of those of which it is said."""
-_ACTIONS, _ROUNDING = re.compile(r"(^|[^a-z])actions?$"), 1e-6
+_ACTIONS, _ROUNDING = re.compile(r"(^|[^a-z])actions?$", re.I), 1e-6
 """What commands are called that a controller may scale, and single precision near 1."""
 _VALID = re.compile(
     r"((observations?|obs|data|frames?|robot|arm|joints?|joint_states?)[/.])*"
