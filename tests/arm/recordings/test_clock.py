@@ -281,6 +281,7 @@ def test_times_that_are_no_numbers_are_left_to_the_recording():
         ({"meta.frame_rate": 50}, None, ("frame_rate", 50)),
         ({"meta.timing.dt_ms": 20.0}, None, ("dt_ms", 50.0)),
         ({"sample_time_ms": 20.0}, None, ("sample_time_ms", 50.0)),
+        ({"fps": 50, "cycle_time": 0.002}, None, ("fps", 50)),
         ({"meta.fps": 50, "rate": np.array(50.0)}, None, ("rate", 50.0)),
         ({"meta.fps": 50, "meta.camera.fps": 30}, None, ("fps", 50)),
         ({"meta.fps": 50, "meta.robot.hz": 100}, 50.0, ("fps", 50)),

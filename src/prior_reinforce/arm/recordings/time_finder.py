@@ -50,7 +50,7 @@ _SAYS_TIME = re.compile(
 """Names that say a time among other words; whether it is that of the frames, the numbers tell."""
 _PERIOD = re.compile(
     r"((control|sampl[a-z]*|frame)[ _]?)?(dt|period|time[ _]?step|delta[ _]?t(ime)?)"
-    r"|(sampl[a-z]*|cycle)[ _]?(time|interval)"
+    r"|sampl[a-z]*[ _]?(time|interval)"
 )
 """What files call the time from one frame to the next."""
 _TICKS = (6.3e17, 6.6e17)
