@@ -294,7 +294,14 @@ def test_actions_that_a_controller_scales_are_no_positions(key, actions, measure
 
 
 @pytest.mark.parametrize(
-    ("scale", "others"), [(1, {}), (1, {"states": Q + 0.01}), (2, {"states": -Q}), (1, {"dq": -Q})]
+    ("scale", "others"),
+    [
+        (1, {}),
+        (1, {"states": Q + 0.01}),
+        (2, {"states": -Q}),
+        (1, {"dq": -Q}),
+        (1, {"ft": -9 * Q, "ball": -Q}),
+    ],
 )
 def test_actions_that_are_positions_are_read(scale, others):
     arrays = {"actions": scale * Q, **others}

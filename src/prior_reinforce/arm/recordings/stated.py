@@ -69,7 +69,9 @@ _FAR_OFF, _SLACK = 5.0, 0.01
 """Standard deviations by which the middle of a motion is off what is said of its mean, and rounding
 of what is said. Ours: a motion is one of those of which it is said."""
 _ACTIONS, _ROUNDING = re.compile(r"(^|[^a-z])actions?$", re.I), 1e-6
-"""What commands are called that a controller may scale, and single precision near 1."""
+_STATES = re.compile(r"(^|[^a-z])(q|q?pos(itions?)?|(joint_?)?states?|joints?|obs\w*)$", re.I)
+"""What commands are called that a controller may scale, single precision near 1, and what measured
+joints are called: as wide as these is a force, too."""
 _VALID = re.compile(
     r"((observations?|obs|data|frames?|robot|arm|joints?|joint_states?)[/.])*"
     r"((is|frame|pose|data)_)?(valid|tracked)(_(mask|flag))?"
@@ -252,7 +254,7 @@ def _refuse_scaled(where: str, positions: Positions, arrays: Arrays, keys: Seque
     if not any(_ACTIONS.search(key) for key in keys) or most > 1 + _ROUNDING:
         return
     like = [n for n, own in arrays.items() if own.shape == positions.shape and n not in keys]
-    like = [name for name in like if not says_no_position(name)]
+    like = [n for n in like if _STATES.search(n) and not says_no_position(n)]
     unlike = like and not any(follows(arrays[name], positions, (1.0,)) for name in like)
     if most > 1 - _ROUNDING or unlike:
         by_key = f"--key {' or '.join(like)}" if like else "--key"
