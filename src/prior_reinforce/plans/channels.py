@@ -346,9 +346,10 @@ def commanded(names: Sequence[str]) -> list[str]:
     """Return commands whose measured counterparts are there: `target_elbow` beside `elbow`."""
     bare = {name: re.sub(_MEASURED, "", _words(name)).split() for name in names}
     of = {name: re.sub(_COMMANDED, "", _words(name)).split() for name in names}
-    orders = [name for name in names if re.search(_COMMANDED, _words(name))]
-    measured = [bare[name] for name in names if name not in orders]
-    return [name for name in orders if of[name] in measured]
+    places = [name for name in names if is_of_pose(name) or not says_no_position(name)]
+    orders = [name for name in places if re.search(_COMMANDED, _words(name))]
+    measured = [bare[name] for name in places if name not in orders]
+    return [name for name in orders if of[name] and of[name] in measured]
 
 
 def measured_of(stems: Sequence[str]) -> str | None:

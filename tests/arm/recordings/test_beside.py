@@ -163,6 +163,14 @@ def test_a_base_of_many_numbers_hides_no_gripper():
     assert select([recording]).left_out.startswith("grip, 0 to 1; base_T[0], 1 to 2; base_T[1], 0")
 
 
+def test_only_a_measured_position_makes_a_command_one_of_its_own():
+    for names in (["velocity", "target_velocity"], ["elbow_target", "elbow_current"]):
+        assert [*twin_vectors(["pan", *names], Q)] == []
+    assert [*twin_vectors(["pan", "state", "goal"], Q)] == []
+    (asked,) = twin_vectors(["tcp_x", "tcp_x_cmd", "pan"], Q)
+    assert asked.option == "--joints tcp_x pan"
+
+
 def test_commands_of_single_names_are_asked_about_beside_what_was_measured():
     columns = ["shoulder", "elbow", "grip", "target_elbow", "shoulder_cmd", "goal_x"]
     values = np.column_stack([Q, Q[:, :2] + 0.1, S])
