@@ -138,11 +138,10 @@ def twin_vectors(names: Sequence[str], values: Positions) -> Iterator[Ambiguity]
             yield Ambiguity(what, keys, guessed=False)
             return
     if orders := commanded(names):
-        what = (
-            f"{say_names(orders)} {'are commands' if len(orders) > 1 else 'is a command'} beside "
-        )
+        are = "are commands or targets" if len(orders) > 1 else "is a command or a target"
+        what = f"{say_names(orders)} {are} beside what was measured"
         rest = shlex.join([name for name in names if name not in orders])
-        yield Ambiguity(f"{what}what was measured", f"--joints {rest}", guessed=False)
+        yield Ambiguity(what, f"--joints {rest}", guessed=False)
 
 
 def _is_series(name: str, moving: np.ndarray, others: Arrays) -> bool:

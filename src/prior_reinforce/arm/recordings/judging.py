@@ -43,7 +43,7 @@ _OF_COUNTS = " ('{:.2g} deg' for {} counts a turn, their middle subtracted in th
 _OF_OPEN = " (100 over its number when fully open: '0.1 percent' if its range is 0 to 1000)"
 _NORMALISED = (
     "and all fill -1 to 1 to the last digit, or have a mean of 0 and a deviation of 1, as what was "
-    "normalised does (then write it as it was before)"
+    "normalised does (then write it as it was before; say rad if they are angles)"
 )
 _BELOW = "and goes below 0, which no opening does (then write 0 where it is closed)"
 _NOT_DONE, _HARDLY = "which no arm does", "which is hardly a motion"
