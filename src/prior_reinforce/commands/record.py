@@ -20,6 +20,7 @@ from prior_reinforce.arm.executing.lock import executing_lock
 from prior_reinforce.arm.executing.watch import Take, Watch
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.outcomes import OUTCOMES_FILE, Place, keep_places
+from prior_reinforce.arm.workspace.folder import RECORDINGS
 from prior_reinforce.arm.workspace.manifest import Manifest
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.commands.base import OnWorkspace
@@ -31,7 +32,6 @@ from prior_reinforce.files import named_disk_errors
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.terminal import plain
 
-RECORDINGS = "recordings"
 Which = Literal["measured", "commanded"]
 _MOTIONS: tuple[Which, ...] = ("measured", "commanded")
 _SUFFIXES = (".npz", ".png")

@@ -14,6 +14,7 @@ from prior_reinforce.arm.workspace.text import (
     say_expectation,
     tell_example,
 )
+from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.formats import OutcomeFormat
 from tests.arm.workspace.planar import amend, ask, describe, tell
 
@@ -86,6 +87,16 @@ def test_a_goal_far_outside_may_be_refused_and_a_nearer_one_is_named(workspace):
 def test_how_many_trials_are_to_go_is_left_out_where_nobody_knows(workspace):
     trial = replace(ask(workspace), expected=Expectation(1e-8))
     assert say_expectation(workspace.standing, trial)[0] == "a hit is unlikely"
+
+
+def test_takes_that_were_recorded_and_not_imported_are_named(tmp_path):
+    with Workspace.create(tmp_path / "new", robot="none", action_names=("a", "b")) as workspace:
+        assert workspace.status().next.endswith(f"import {workspace.folder} RECORDINGS")
+        for number in (2, 10, 11):
+            (workspace.folder / "recordings" / str(number)).mkdir(parents=True)
+        (workspace.folder / "recordings" / "2" / "take-1.npz").touch()
+        (workspace.folder / "recordings" / "10" / "take-1.npz").touch()
+        assert workspace.status().next.endswith(f"{workspace.folder / 'recordings' / '10'}")
 
 
 def test_a_name_of_several_words_is_one_word_where_a_number_is_to_be_typed(workspace):

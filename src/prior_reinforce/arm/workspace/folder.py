@@ -10,6 +10,8 @@ from prior_reinforce.arm.workspace.manifest import MANIFEST_FILE, parse_manifest
 from prior_reinforce.errors import WorkspaceError
 from prior_reinforce.files import named_disk_errors, require_inside, sweep, write
 
+RECORDINGS = "recordings"
+"""Folder of what `record` takes, a numbered one for each time."""
 _FOLDERS = ("demonstrations", "models", "plans", "executions", "pictures", "report")
 _OWN = (MANIFEST_FILE, JOURNAL_FILE, *_FOLDERS, "demonstrations.png", "outcomes.csv")
 """What is read and written in the folder."""

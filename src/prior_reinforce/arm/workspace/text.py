@@ -9,6 +9,7 @@ from typing import Literal
 
 from prior_reinforce.arm.executing.lock import programs_executing
 from prior_reinforce.arm.workspace.events import Moved, Moving
+from prior_reinforce.arm.workspace.folder import RECORDINGS
 from prior_reinforce.arm.workspace.manifest import Manifest, workspace_around
 from prior_reinforce.arm.workspace.state import Standing, WorkspaceState
 from prior_reinforce.errors import TrialStateError
@@ -161,7 +162,7 @@ def _next_step(now: Standing) -> str:
     if trial is None:
         match now.step:
             case "import":
-                return call(folder, "import", "RECORDINGS")
+                return call(folder, "import", _recorded(folder))
             case "learn":
                 learn, shown = call(folder, "learn"), state.demonstrations
                 if now.manifest.symmetry is None and shown is not None and shown.n == 1:
@@ -187,6 +188,14 @@ def _next_step(now: Standing) -> str:
         case "execute" if now.manifest.driven_by or trial.number in state.executions:
             return execute_step(now, trial)
     return f"{tell} (or --hit)"
+
+
+def _recorded(folder: Path) -> str:
+    """The newest takes that `record` kept and nothing imported, or what stands for some."""
+    kept = [path for path in (folder / RECORDINGS).glob("*/") if any(path.glob("*.npz"))]
+    numbered = [path for path in kept if path.name.isdecimal()]
+    newest = max(numbered, key=lambda path: int(path.name), default=None)
+    return "RECORDINGS" if newest is None else shlex.quote(str(newest))
 
 
 def goal_step(now: Standing) -> str:
