@@ -344,12 +344,15 @@ def is_opening(name: str) -> bool:
 
 def commanded(names: Sequence[str]) -> list[str]:
     """Return commands whose measured counterparts are there: `target_elbow` beside `elbow`."""
-    bare = {name: re.sub(_MEASURED, "", _words(name)).split() for name in names}
-    of = {name: re.sub(_COMMANDED, "", _words(name)).split() for name in names}
-    places = [name for name in names if is_of_pose(name) or not says_no_position(name)]
-    orders = [name for name in places if re.search(_COMMANDED, _words(name))]
-    measured = [bare[name] for name in places if name not in orders]
-    return [name for name in orders if of[name] and of[name] in measured]
+    poses = [name for name in names if is_of_pose(name) or not says_no_position(name)]
+    commands = [name for name in poses if re.search(_COMMANDED, _words(name))]
+    measured = [_without(_MEASURED, name) for name in poses if name not in commands]
+    return [name for name in commands if (bare := _without(_COMMANDED, name)) and bare in measured]
+
+
+def _without(pattern: str, name: str) -> list[str]:
+    """Split a name into words, without those of a pattern."""
+    return re.sub(pattern, "", _words(name)).split()
 
 
 def measured_of(stems: Sequence[str]) -> str | None:

@@ -20,7 +20,7 @@ HALF = 0.01
 """Tolerance of a step of half a turn, as a share of a turn. Ours: what a wrist turns in one
 frame."""
 _NEAR = 0.3
-"""What is left of a leap once it is taken as one of a turn, or of a sign, in [rad]. Ours."""
+"""Largest residual of a leap after a turn or a sign is taken out, in [rad]. Ours."""
 CIRCLES = r"yaw|roll|heading|azimuth?|bearing|gier(winkel)?|roll(winkel)?"
 """Names of angles without stops."""
 _OF_A_LIMB = re.compile(
@@ -87,9 +87,9 @@ def other_form(attitude: np.ndarray) -> np.ndarray:
 
 
 def leap_alone(motions: Sequence[np.ndarray]) -> bool:
-    """Whether of three numbers one leaps by a turn and the others go on, as Euler angles do.
+    """Return whether one of three numbers leaps by a turn alone, as Euler angles do.
 
-    The numbers of a rotation vector change their sign together.
+    The numbers of a rotation vector leap together, since its sign changes.
     """
     starts = np.array([motion[0] for motion in motions])
     alone, together = 0.0, 0.0
@@ -104,7 +104,7 @@ def leap_alone(motions: Sequence[np.ndarray]) -> bool:
 
 
 def _expected(motion: np.ndarray) -> np.ndarray:
-    """Each frame but the first, if the step before went on; none goes on after a leap."""
+    """Extrapolate each frame but the first from the two before it, without leaps."""
     steps = np.diff(motion, axis=0)
     steps[np.linalg.norm(steps, axis=1) > 1] = 0.0
     return motion[:-1] + np.vstack([np.zeros(motion.shape[1]), steps[:-1]])

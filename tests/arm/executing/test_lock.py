@@ -10,6 +10,7 @@ import time
 
 import pytest
 
+from prior_reinforce.arm.executing.drive import program
 from prior_reinforce.arm.executing.lock import (
     MARK,
     executing_lock,
@@ -53,6 +54,20 @@ def test_an_arm_is_one_whatever_workspace_moves_it(tmp_path):
         assert not is_executing(tmp_path / "copy")
         with executing_lock(tmp_path / "copy", arm="left"):
             pass
+
+
+@pytest.mark.slow
+@on_linux
+def test_a_program_of_ours_is_named_by_its_module(tmp_path):
+    (tmp_path / "sleeper.py").write_text("import time\n\n\ndef main():\n    time.sleep(60)\n")
+    with executing_lock(tmp_path) as lock:
+        own = {MARK: " ".join(lock.names), "PYTHONPATH": str(tmp_path)}
+        ours = subprocess.Popen(program("sleeper"), env=os.environ | own)
+        try:
+            assert programs_executing(tmp_path) == [(ours.pid, "python -m sleeper")]
+        finally:
+            ours.kill()
+            ours.wait()
 
 
 @pytest.mark.slow

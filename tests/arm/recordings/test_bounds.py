@@ -18,7 +18,7 @@ from prior_reinforce.arm.recordings.bounds import (
     check_chunks,
     check_names,
     check_numbers,
-    check_width,
+    check_rows,
 )
 from prior_reinforce.errors import FileFormatError
 
@@ -200,6 +200,6 @@ def test_the_bounds_themselves(tmp_path):
     check_names("a file", ["a" * 200])
     with pytest.raises(FileFormatError, match="a file has a name of 201 characters"):
         check_names("a file", ["a" * 201])
-    check_width("a file", [(1, ["t", "q", ""]), (2, ["0"]), (3, ["1", "2"])])
+    check_rows("a file", [(1, ["t", "q", ""]), (2, ["0"]), (3, ["1", "2"])])
     with pytest.raises(FileFormatError, match="3 names in line 2, and 2 cells"):
-        check_width("a file", [(2, ["t", "q1", "q2"]), (3, ["1", "2"]), (4, ["1"])])
+        check_rows("a file", [(2, ["t", "q1", "q2"]), (3, ["1", "2"]), (4, ["1"])])

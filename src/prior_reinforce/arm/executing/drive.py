@@ -221,7 +221,7 @@ def say_distance(
 
 
 def _pose(executor: Executor, arm: ArmDescription) -> Float[np.ndarray, " d"]:
-    """Where an arm stands, as floats: a pose of whole numbers would round what is put into it.
+    """Return an arm's pose as floats: a plan that is written into whole numbers is rounded.
 
     ConfigurationError if it does not give a finite number for each of its channels.
     """

@@ -31,8 +31,8 @@ _STANDS = 0.02
 _STARTS = 0.2
 """Part of that which suffices where the start is as many times off as the end. Ours."""
 _CUT, _AGAIN = 0.2, 0.02
-"""Time in [s] by which one motion may be cut elsewhere than its like, and part of the largest range
-by which smoothing changes it. Ours."""
+"""Largest shift in time between two recordings of one motion, in [s], and largest change by
+smoothing, as a share of the largest range. Ours."""
 
 
 def check_scale(before: Demonstrations, selection: Selection) -> None:
@@ -69,8 +69,9 @@ def appended(
         raise InvalidDemonstrationsError(twice)
     again = [name for i, name in enumerate(episodes) if _is_there(before, more, i)]
     if again:
-        drop = "there is nothing to append"
-        drop = f"--leave-out {shlex.join(again)}" if len(again) < len(episodes) else drop
+        drop = f"--leave-out {shlex.join(again)}"
+        if len(again) == len(episodes):
+            drop = "there is nothing to append"
         raise InvalidDemonstrationsError(
             f"{listed(again)} landed where demonstrations so far did to the last digit, after the "
             f"same motion: if they are these throws again, smoothed or cut elsewhere, {drop}; else "
@@ -86,7 +87,7 @@ def appended(
 def _is_there(before: Demonstrations, more: Demonstrations, i: int) -> bool:
     """Whether a demonstration in use has the same outcome as a new one, and nearly its motion.
 
-    That may begin a little earlier or later, as where it was cut elsewhere.
+    The motion may begin a little earlier or later.
     """
     most = round(_CUT / before.format.dt)
     new = np.pad(more.plans[i], ((most, most + before.horizon), (0, 0)), mode="edge")

@@ -1,8 +1,8 @@
 """How large recordings may be: checked from headers and counts, before anything is allocated.
 
 A small file can claim, or unpack to, more than any machine holds; the limits of all readers stand
-here, each far above what arms record, and that of names over too few cells. Every check raises
-FileFormatError.
+here, each far above what arms record. Rows that are no table are refused here too. Every check
+raises FileFormatError.
 """
 
 from __future__ import annotations
@@ -82,8 +82,11 @@ def check_names(where: object, names: Iterable[object]) -> None:
             )
 
 
-def check_width(where: str, rows: Sequence[tuple[int, Sequence[str]]]) -> None:
-    """Refuse a first row of more texts than any numbered row below has cells, and YAML."""
+def check_rows(where: str, rows: Sequence[tuple[int, Sequence[str]]]) -> None:
+    """Refuse YAML, and more names in the first row than any row below has cells.
+
+    Each row comes with the number of its line.
+    """
     if any(row == ["---"] for _, row in rows):
         raise FileFormatError(
             f"{where} is YAML, as ros2 topic echo prints it, and no table: record a bag, or print "

@@ -42,14 +42,14 @@ from prior_reinforce.arm.recordings.stated import (
     says_valid,
     without_invalid,
 )
-from prior_reinforce.arm.recordings.table_heads import failed, headed, said_beside, with_heads
+from prior_reinforce.arm.recordings.table_heads import failed, headed, read_sidecar, with_heads
 from prior_reinforce.arm.recordings.table_times import (
     called_times,
     clock_of_table,
     counts_rows,
     is_coarse_time,
+    is_long_format,
     named_column,
-    names_rows_of_a_time,
     time_columns,
     with_whole_dates,
 )
@@ -65,7 +65,7 @@ IN_TEXT = (".txt", ".dat", ".log")
 _ABSENT = 9e9
 """What ABB writes for the position of an axis that is not there."""
 _SEVERAL = re.compile(r"[-+.\deE]+(\s*[,;\s]\s*[-+.\deE]+)+")
-"""`0.1,0.2`, in a cell."""
+"""Several numbers in a cell: `0.1,0.2`."""
 _MOST_WORDS = 8
 """Texts between which a column switches. Ours."""
 _FEW_FILES = 4
@@ -104,8 +104,8 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             table = read_table(path, options.delimiter, options.decimal)
             if len(paths) > 1 and _has_a_row_each(table, stems):
                 continue
-            beside = said_beside(table, options.joints)
-            table = headed(table, beside, options.joints)
+            sidecar = read_sidecar(table, options.joints)
+            table = headed(table, sidecar, options.joints)
             table = with_whole_dates(with_heads(table))
             if not table.names or len(table) < 2:
                 raise FileFormatError(
@@ -118,7 +118,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         for episode in sorted({*names} - {""} or {""}, key=natural_order):
             own = table.rows([i for i, name in enumerate(names) if name == episode])
             others = {*stems, *names} - {path.stem, episode}
-            remarks = (*left, *failed(table, beside, others))
+            remarks = (*left, *failed(table, sidecar, others))
             how = episode, options, column, guessed, remarks
             guarded = or_leave_out(path.stem, partial(_has_other_columns, path, paths, options))
             yield episode, guarded(partial(_episode, own, *how))
@@ -285,8 +285,8 @@ def _episode(
     filled = {i: [*filter(None, table.cells[i])] for i in texts}
     lists = [i for i, own in filled.items() if own and all(map(_SEVERAL.fullmatch, own))]
     absent = [i for i in channels if found is None and np.all(table.values[:, i] == _ABSENT)]
-    of_flags = [i for i in others if table.named and _is_flag(called[i])]
-    flags = {i: _flag(table, i) for i in of_flags}
+    is_flag = [table.named and (says_valid(name) or says_success(name)) for name in called]
+    flags = {i: _flag(table, i) for i in others if is_flag[i]}
     for left, why in (
         ([*flags, *no_channel], "is no joint by its name"),
         (absent, "is 9E+09 all along, as ABB writes of an axis that is not there"),
@@ -347,7 +347,7 @@ def _refuse_text(
     """FileFormatError if joints are texts: names in a column of their own, or `True`."""
     opens = Kind.TOOL in kinds(joints)
     for i, cells in enumerate(table.cells):
-        if (len(joints) > 1 and {*joints} <= {*cells}) or names_rows_of_a_time(table, i):
+        if (len(joints) > 1 and {*joints} <= {*cells}) or is_long_format(table, i):
             raise FileFormatError(
                 f"{table.where}: each row is of one joint, which {names[i]} names; write a row a "
                 "frame and a column a joint: pandas' DataFrame.pivot(index=TIME, columns="
@@ -397,10 +397,6 @@ def _cells(table: Table, columns: Sequence[int], row: int) -> tuple[str, ...]:
     """The texts of some cells of a row, or of the list in an only one."""
     own = [table.cells[i][row] for i in columns]
     return words(own[0] if len(own) == 1 else own)
-
-
-def _is_flag(name: str) -> bool:
-    return says_valid(name) or says_success(name)
 
 
 def _flag(table: Table, column: int) -> np.ndarray:

@@ -68,10 +68,12 @@ if that is more. Ours: sound has more."""
 _FAR_OFF, _SLACK = 5.0, 0.01
 """Standard deviations by which the middle of a motion is off what is said of its mean, and rounding
 of what is said. Ours: a motion is one of those of which it is said."""
-_ACTIONS, _ROUNDING = re.compile(r"(^|[^a-z])actions?$", re.I), 1e-6
+_ACTIONS = re.compile(r"(^|[^a-z])actions?$", re.I)
+"""Names of commands that a controller may scale."""
 _STATES = re.compile(r"(^|[^a-z])(q|q?pos(itions?)?|(joint_?)?states?|joints?|obs\w*)$", re.I)
-"""What commands are called that a controller may scale, single precision near 1, and what measured
-joints are called: as wide as these is a force, too."""
+"""Names of measured joints; an array of as many columns may also be a force."""
+_ROUNDING = 1e-6
+"""Rounding of single precision near 1."""
 _VALID = re.compile(
     r"((observations?|obs|data|frames?|robot|arm|joints?|joint_states?)[/.])*"
     r"((is|frame|pose|data)_)?(valid|tracked)(_(mask|flag))?"
@@ -246,9 +248,9 @@ def _refuse_normalised(
 
 
 def _refuse_scaled(where: str, positions: Positions, arrays: Arrays, keys: Sequence[str]) -> None:
-    """FileFormatError if actions are what a controller scales, or increments: -1 to 1.
+    """FileFormatError if actions are scaled commands or increments, between -1 and 1.
 
-    They reach an end exactly, or there is an array as wide that they do not follow.
+    So if they reach an end exactly, or do not follow measured joints of as many columns.
     """
     most = np.nanmax(np.abs(positions), initial=0.0)
     if not any(_ACTIONS.search(key) for key in keys) or most > 1 + _ROUNDING:

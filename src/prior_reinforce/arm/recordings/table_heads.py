@@ -41,29 +41,29 @@ _OF_RECORDINGS = re.compile(
     r"|schema|fields?|experiment)[ _-]?)+",
     re.IGNORECASE,
 )
-"""What a JSON is called that is of all recordings beside it; a `camera_info.json` is not."""
+"""Names of a JSON file that describes all recordings of a folder; no `camera_info.json`."""
 _OF_JOINTS = re.compile(r"(^|[._])joint_?(names?|units?)$", re.IGNORECASE)
-"""What says whatever a JSON is called that it is of joints: `joint_names`."""
+"""Keys of a JSON file that describes joints, whatever its name: `joint_names`."""
 _COMMENT = re.compile(r"[#%/;\s]*(\w[\w .]*?)\s*[:=]\s*(\w+)\W*")
-"""`# success: false`"""
+"""A comment with one value: `# success: false`."""
 _MOST_SAID = 1_000_000
 """Bytes of a JSON beside a table at most. Ours: it says what the columns are."""
 
 
-class Beside(NamedTuple):
-    """What a JSON says of the table beside it."""
+class Sidecar(NamedTuple):
+    """Contents of the JSON file that describes a table."""
 
     where: Path
-    """Itself; the table if there is none."""
+    """The JSON file; the table if there is none."""
     texts: Texts
     numbers: Mapping[str, float]
 
 
-def said_beside(table: Table, joints: Sequence[str] | None = None) -> Beside:
-    """Return what a JSON beside a table says.
+def read_sidecar(table: Table, joints: Sequence[str] | None = None) -> Sidecar:
+    """Read the JSON file that describes a table; an empty one if there is none.
 
-    It is called as the table; or it is the only one of the folder, and its name says that it is of
-    recordings, or it names columns of the table, or names joints or their units.
+    It has the table's name; or it is the only JSON in the folder and either its name is one of
+    recordings, or it names columns of the table, or joints or their units.
     """
     path = Path(table.where)
     own = path.with_suffix(".json")
@@ -75,17 +75,17 @@ def said_beside(table: Table, joints: Sequence[str] | None = None) -> Beside:
         named = [name for name in {*table.names, *(joints or ())} & said if not says_time(name)]
         of_table = own.is_file() or len(named) > 1 or any(map(_OF_JOINTS.search, texts))
         if of_table or _OF_RECORDINGS.fullmatch(found[0].stem):
-            return Beside(found[0], texts, numbers)
-    return Beside(path, {}, {})
+            return Sidecar(found[0], texts, numbers)
+    return Sidecar(path, {}, {})
 
 
-def headed(table: Table, beside: Beside, joints: Sequence[str] | None = None) -> Table:
-    """Return a table with heads and units that its comments, or a JSON beside it, say.
+def headed(table: Table, sidecar: Sidecar, joints: Sequence[str] | None = None) -> Table:
+    """Return a table with the heads and units that its comments, or its sidecar, state.
 
     Names of all columns but the first are taken if that one rises, as times do. Heads of the
     table's own count more, and a single unit for all is only one of angles.
     """
-    where, texts = beside.where, beside.texts
+    where, texts = sidecar.where, sidecar.texts
     names = table.names if table.named else names_said(where, texts, len(table.names), joints)
     if not names and texts and len(table) and rises(table.stamps(0)):
         names = names_said(where, texts, len(table.names) - 1, joints)
@@ -111,14 +111,14 @@ def headed(table: Table, beside: Beside, joints: Sequence[str] | None = None) ->
     return replace(table, names=names, units=units, named=True)
 
 
-def failed(table: Table, beside: Beside, others: Collection[str]) -> Iterator[str]:
-    """Remark on what calls a table's motion failed, in its comments or a JSON beside it.
+def failed(table: Table, sidecar: Sidecar, others: Collection[str]) -> Iterator[str]:
+    """Remark on flags in a table's comments or its sidecar by which its motion failed.
 
-    What the JSON says under the name of another recording is of that one.
+    What the sidecar says under the name of another recording is of that one.
     """
     found = filter(None, map(_COMMENT.fullmatch, table.comments))
     comments = {match[1]: match[2] for match in found}
-    said = {**beside.texts, **beside.numbers}
+    said = {**sidecar.texts, **sidecar.numbers}
     own = {place: one for place, one in said.items() if {*others}.isdisjoint(place.split("."))}
     return failures({**comments, **own})
 

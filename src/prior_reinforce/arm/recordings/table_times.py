@@ -149,8 +149,8 @@ def is_coarse_time(table: Table, column: int) -> bool:
     return dates is not None and bool(np.diff(dates).max(initial=0) <= NS_PER_S)
 
 
-def names_rows_of_a_time(table: Table, column: int) -> bool:
-    """Whether a column of texts tells the rows of each time apart, as of one joint each."""
+def is_long_format(table: Table, column: int) -> bool:
+    """Whether a table has a row for each joint and time (long format), named by this column."""
     texts = {*table.cells[column]}
     if len(texts) < 2 or not table.is_text(column):
         return False

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Int
 
-from prior_reinforce.arm.recordings.bounds import check_bytes, check_names, check_table, check_width
+from prior_reinforce.arm.recordings.bounds import check_bytes, check_names, check_rows, check_table
 from prior_reinforce.arm.recordings.recording import named_damage
 from prior_reinforce.arm.recordings.units import known_unit, split_unit
 from prior_reinforce.errors import FileFormatError
@@ -195,7 +195,7 @@ def _read_csv(
     check_table(path, len(data), widest)
     cells = _split((f"{line}\n" for _, line in data), delimiter, strict=True)
     rows = [(data[cells.line_num - 1][0], [cell.strip() for cell in row]) for row in cells]
-    check_width(str(path), [] if head else rows)  # of outcomes, a short line is named
+    check_rows(str(path), [] if head else rows)  # of outcomes, a short line is named
     above = [line for i, line in kept if i == data[0][0] - 1 and (i, line) not in data]
     title = (
         [c.strip() for c in next(_split([above[0].lstrip(" #%/")], delimiter), [])] if above else []

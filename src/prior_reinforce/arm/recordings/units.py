@@ -60,7 +60,7 @@ _NO_ENDING = {
 _BEFORE_NUMBER = re.compile(r"(?P<name>.+?)_(?P<unit>deg|rad|mm|cm)(?P<number>_?\d+)", re.I)
 """`q_deg_0`."""
 _OF_OTHERS = re.compile(r".+_(?:(?P<of>deg|rad|mm|m|d)_?p(?:er_?)?s(?:ec)?|(?P<load>Nm))", re.I)
-"""`vel_1_degps`, `torque_1_Nm`: no angles, which keep their whole names."""
+"""Units of speeds and loads at the end of names, which keep them: `vel_1_degps`, `load_1_Nm`."""
 _UNKNOWN = re.compile(r"(?P<name>.+?)\s*\[\s*(?P<unit>[^\[\]]*[^\W\d_][^\[\]]*?|%)\s*\]")
 """`pressure [bar]` or `x [cm ahead]`, in an unknown unit: what holds a letter, unlike `x[0]`."""
 

@@ -320,7 +320,7 @@ class Joint:
 
 
 def _root_of(content: bytes) -> ElementTree.Element:
-    """The root element; prefixes that no line declares, as Drake's, are declared by their names."""
+    """Parse the root element; undeclared prefixes, such as Drake's, are declared first."""
     try:
         return ElementTree.fromstring(content, ElementTree.XMLParser(target=_Builder()))
     except ElementTree.ParseError as error:

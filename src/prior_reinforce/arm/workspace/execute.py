@@ -192,7 +192,7 @@ def note_not_moved(workspace: Workspace) -> None:
         now = workspace.standing
         trial = now.state.open_trial
         if trial is None:
-            raise TrialStateError("no trial waits that the arm did not move for; ask without that")
+            raise TrialStateError("no trial waits to be executed: ask without --arm-did-not-move")
         if now.state.stage(trial) == "asked":
             return
         if now.moving:
@@ -273,7 +273,7 @@ def _begin(workspace: Workspace, event: Moving) -> None:
 
 
 def _end(workspace: Workspace, event: Moved) -> None:
-    """Note how the motion ended, even of a trial that was told or voided meanwhile; once."""
+    """Note, once, how a motion ended, even if its trial was told or voided meanwhile."""
     with workspace.log.exclusive():
         latest = workspace.state.executions.get(event.trial)
         if event.motion != "trial" or isinstance(latest, Moving):

@@ -191,10 +191,10 @@ def _next_step(now: Standing) -> str:
 
 
 def _recorded(folder: Path) -> str:
-    """The newest takes that `record` kept and nothing imported, or what stands for some."""
-    kept = [path for path in (folder / RECORDINGS).glob("*/") if any(path.glob("*.npz"))]
-    numbered = [path for path in kept if path.name.isdecimal()]
-    newest = max(numbered, key=lambda path: int(path.name), default=None)
+    """Folder of the newest takes of `record`, or a placeholder if there are none."""
+    numbered = [path for path in (folder / RECORDINGS).glob("*") if path.name.isdecimal()]
+    kept = [path for path in numbered if any(path.glob("*.npz"))]
+    newest = max(kept, key=lambda path: int(path.name), default=None)
     return "RECORDINGS" if newest is None else shlex.quote(str(newest))
 
 
