@@ -32,6 +32,7 @@ def calibrated(camera, tilt, noise=0.0, middle=(640.0, 360.0), picture=SIZE):
     return TableCalibration.fit(POINTS, pixels, picture=picture)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("camera", "tilt"), [((0.75, 0.0, 2.4), 0.1), ((0.0, 0.1, 2.2), 0.4), ((-0.4, 0.0, 1.6), 0.7)]
 )
