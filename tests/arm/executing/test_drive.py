@@ -1,10 +1,12 @@
 """What is done once for every executor: columns, start pose, limits, approach, stopping."""
 
 import json
+import re
 import signal
 import subprocess
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import msgspec
 import numpy as np
@@ -429,3 +431,21 @@ def test_a_unit_may_be_given_its_own_error():
     own = GateSettings(errors=(("steps", 40.0, 40.0),), start_error=0.1)
     for steps, near in ((39, True), (41, False)):
         assert say_distance(np.array([0.09, 0.0, 0.0, steps]), OF_UNITS, own)[1] == near
+
+
+@pytest.mark.parametrize(
+    ("t", "q", "says"),
+    [
+        (np.arange(3.0), np.zeros((3, 3)), r"q \(T, 2\), got \(3,\) and \(3, 3\)"),
+        (np.arange(3.0), np.zeros((2, 2)), r"got \(3,\) and \(2, 2\)"),
+        (0.5, np.zeros((3, 2)), r"got \(\) and \(3, 2\)"),
+        (["soon"], np.zeros((1, 2)), "holds no numbers"),
+    ],
+)
+def test_a_motion_is_done_whatever_its_executor_calls_its_path(arm, monkeypatch, t, q, says):
+    path = SimpleNamespace(t=t, q=q, fault="", moved=True)
+    monkeypatch.setattr(toy_arm.ToyArm, "run", lambda self, plan: path)
+    result = arm.drive()
+    assert result.outcome == "done"
+    assert re.search(says, result.reason)
+    assert not (arm.result / "executed.npz").exists()

@@ -151,6 +151,34 @@ def test_an_execution_whose_program_was_killed_is_recorded_by_what_watched_over_
     assert recover(workspace) is None
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("verb", ["tell", "void"])
+def test_what_a_killed_program_would_have_noted_is_noted_after_the_trial_was_settled(
+    workspace, tmp_path, verb
+):
+    workspace.session().ask()
+    (tmp_path / "arm.py").write_text(f"{CONTROLLER}\nsys.exit(3)")
+    command = f"{sys.executable} {tmp_path}/arm.py {tmp_path} {{plan}}"
+    program = subprocess.Popen([sys.executable, "-c", PROGRAM, workspace.folder, command])
+    wait_for((tmp_path / "runs").exists)
+    session = workspace.session()
+    session.tell(1, [0.05, 0.0]) if verb == "tell" else session.void(1)
+    program.kill()
+    program.wait()
+    (tmp_path / "stop").touch()
+    wait_for(lambda: not is_executing(workspace.folder))
+    asked = session.ask()
+    assert recover(workspace) is None  # nothing of the trial that waits
+    workspace = reopened(workspace)
+    ended = workspace.state.executions[1]
+    assert (ended.outcome, ended.exit_status) == ("aborted", 3)
+    assert workspace.state.trial(1).stage.value == ("told" if verb == "tell" else "voided")
+    assert stage(workspace, asked.number) == "asked"
+    known = len(workspace.events)
+    recover(workspace)
+    assert len(workspace.events) == known
+
+
 def test_an_execution_that_was_interrupted_is_recorded_as_aborted(workspace, tmp_path):
     workspace.session().ask()
     (tmp_path / "arm.py").write_text(CONTROLLER)

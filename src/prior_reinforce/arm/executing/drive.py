@@ -29,6 +29,7 @@ from prior_reinforce.arm.executing.base import (
     ArmSettings,
     Executor,
     Guiding,
+    MeasuredPath,
     Motion,
     begin_at,
 )
@@ -323,6 +324,26 @@ class _Prepared:
         )
 
 
+def _keep(path: MeasuredPath, prepared: _Prepared, folder: Path) -> str:
+    """Write what was measured in the plan's columns; why not, where it is no path of this arm.
+
+    The motion was made, whatever its executor says of it.
+    """
+    d, arm = len(prepared.arm.columns), prepared.arm.model
+    try:
+        t, q = np.asarray(path.t, dtype=np.float64), np.asarray(path.q, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        return f"what {arm} measured is not kept, since it holds no numbers ({error})"
+    if t.ndim != 1 or q.shape != (len(t), d):
+        return (
+            f"what {arm} measured is not kept: t must be (T,) and q (T, {d}), got {t.shape} and "
+            f"{q.shape}"
+        )
+    if len(t):
+        np.savez(folder / PATH_FILE, t=t, q=q[:, prepared.channels])
+    return ""
+
+
 def drive(request: Request, plan: Plan, folder: Path) -> DriverResult:
     """Make one motion, or look; write what came of it."""
     executor: Executor | None = None
@@ -354,8 +375,9 @@ def drive(request: Request, plan: Plan, folder: Path) -> DriverResult:
                 moved = moved_before or path.moved
                 if path.fault:
                     break
-            if motion is [*motions.values()][-1] and len(path.t):
-                np.savez(folder / PATH_FILE, t=path.t, q=path.q[:, prepared.channels])
+            unlike = ""
+            if motion is [*motions.values()][-1]:
+                unlike = _keep(path, prepared, folder)
         finally:
             executor.close()
     except Exception as error:
@@ -363,7 +385,7 @@ def drive(request: Request, plan: Plan, folder: Path) -> DriverResult:
         result = DriverResult("aborted" if moved else "not_moved", why)
     else:
         outcome: Any = "done" if not path.fault else "aborted" if moved else "not_moved"
-        result = DriverResult(outcome, path.fault)
+        result = DriverResult(outcome, "; ".join(filter(None, [path.fault, unlike])))
     (folder / RESULT_FILE).write_bytes(msgspec.json.encode(result))
     return result
 

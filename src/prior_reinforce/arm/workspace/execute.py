@@ -163,24 +163,28 @@ def look_at_arm(workspace: Workspace, number: int, arm: ArmSettings, *, speed: f
 
 
 def recover(workspace: Workspace) -> Trial | None:
-    """Note how an execution ended whose program was killed, where its supervisor wrote it down.
+    """Note how executions ended whose program was killed, where their supervisors wrote it down.
 
-    Returns the trial as it stands now; None where there is nothing to recover.
+    Those of trials that were told or voided meanwhile too. Returns the open trial as it stands now;
+    None where there was nothing to recover of it.
     """
     now = workspace.standing
-    trial = now.state.open_trial
-    if trial is None or now.moving:
+    if now.moving:
         return None
-    _note_unknown_execution(workspace, trial)
-    began = now.state.executions.get(trial.number)
-    if not isinstance(began, Moving) or not began.by or not began.folder:
-        return None  # a person has to say
-    folder = workspace.store.execution_folder(began.folder)
-    result = read_result(folder, workspace.plan_file(trial))
-    if result is None:
-        return None
-    _record(workspace, result, trial, folder)
-    return workspace.state.trial(trial.number)
+    waits = now.state.open_trial
+    if waits is not None:
+        _note_unknown_execution(workspace, waits)
+    recovered = False
+    for number, began in [*now.state.executions.items()]:
+        if not isinstance(began, Moving) or not began.by or not began.folder:
+            continue  # it ended, or a person has to say
+        trial = now.state.trial(number)
+        folder = workspace.store.execution_folder(began.folder)
+        result = read_result(folder, workspace.plan_file(trial))
+        if result is not None:
+            _record(workspace, result, trial, folder)
+            recovered = recovered or trial.open
+    return workspace.state.open_trial if recovered else None
 
 
 def note_not_moved(workspace: Workspace) -> None:
