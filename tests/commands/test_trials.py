@@ -718,3 +718,32 @@ def test_a_check_asks_the_arm_and_moves_nothing(run, arm, folder):
     assert status == 0
     assert "checked; nothing moved" in out
     assert toy_arm.motions(toy) == 0
+
+
+def test_an_arm_that_somebody_moves_while_it_is_asked_about_makes_no_approach(
+    run, arm, folder, person
+):
+    toy = arm()
+    (toy / "pose").write_text("0.5 0.2")
+
+    def move_it():
+        (toy / "pose").write_text("1.5 0.2")
+        return "yes"
+
+    person(move_it)
+    status, _, err = run("ask", folder, "--approach", "--execute")
+    assert status == 1
+    assert "from where it stood when a person was asked" in err
+    assert toy_arm.motions(toy) == 0
+
+
+def test_what_could_not_be_kept_of_a_throw_is_said_beside_what_is_told(
+    run, folder, driver, tmp_path
+):
+    run("goal", folder, "0.9", "0.05")
+    (tmp_path / "say.json").write_text('{"outcome": "done", "reason": "no path was measured"}')
+    status, _, err = run("ask", folder, "--yes", "--run", driver)
+    assert status == 0
+    assert "executed, but no path was measured" in err
+    run("tell", folder, 1, "--hit")
+    assert "reached (hit); executed, but no path was measured" in run("status", folder)[1]

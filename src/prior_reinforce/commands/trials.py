@@ -229,6 +229,7 @@ class Ask(OnWorkspace):
             speed=speed,
             show=lambda text: print(text, end="", flush=True),
             stop_seen=stop_seen,
+            stood=None if look is None else look.pose,
         )
         return _say_ended(workspace, trial.number, motion, result)
 
@@ -327,6 +328,8 @@ def _say_ended(workspace: Workspace, number: int, motion: Motion, result: Motion
         said = f"trial {number}{why}; nobody knows what moved: look, then ask again"
     elif motion != "trial":
         if result.succeeded:
+            if motion == "rehearsal":
+                print_next(workspace)
             return 0
         said = f"the {motion} was aborted{why}; trial {number} was not executed"
     else:

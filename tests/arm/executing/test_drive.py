@@ -58,16 +58,20 @@ def arm(tmp_path, toy_plugin):
     class Arm:
         folder = tmp_path / "arm"
 
-        gate, limits = GateSettings(), None
+        gate, limits, stood = GateSettings(), None, {}
 
         def request(self, motion="trial", speed=1.0, **options):
             settings = ArmSettings(TOY, {"folder": str(self.folder)} | options)
-            return Request(settings, self.gate, motion, speed, self.limits)
+            return Request(settings, self.gate, motion, speed, self.limits, self.stood)
 
         def drive(self, motion="trial", plan=PLAN, speed=1.0, **options):
             self.result = tmp_path / f"result-{len(list(tmp_path.iterdir()))}"
             self.result.mkdir()
             return drive(self.request(motion, speed, **options), plan, self.result)
+
+        def look(self):
+            assert self.drive("look").outcome == "done"
+            return read_look(self.result)
 
         def motions(self):
             path = self.folder / "motions"
@@ -440,6 +444,7 @@ def test_a_unit_may_be_given_its_own_error():
         (np.arange(3.0), np.zeros((2, 2)), r"got \(3,\) and \(2, 2\)"),
         (0.5, np.zeros((3, 2)), r"got \(\) and \(3, 2\)"),
         (["soon"], np.zeros((1, 2)), "holds no numbers"),
+        (np.arange(3.0), np.full((3, 2), np.nan), "not all of it is finite"),
     ],
 )
 def test_a_motion_is_done_whatever_its_executor_calls_its_path(arm, monkeypatch, t, q, says):
@@ -449,3 +454,15 @@ def test_a_motion_is_done_whatever_its_executor_calls_its_path(arm, monkeypatch,
     assert result.outcome == "done"
     assert re.search(says, result.reason)
     assert not (arm.result / "executed.npz").exists()
+
+
+def test_an_approach_begins_where_the_arm_stood_when_a_person_was_asked(arm):
+    arm.stands(0.5, 0.2)
+    arm.stood = arm.look().pose
+    arm.stands(1.5, 0.2)
+    result = arm.drive("approach")
+    assert result.outcome == "not_moved"
+    assert re.search(r"1 rad \(arm_joint1\) from where it stood .*: ask again", result.reason)
+    assert arm.motions() == 0
+    arm.stands(0.5001, 0.2)  # what an encoder shows at rest
+    assert arm.drive("approach").outcome == "done"

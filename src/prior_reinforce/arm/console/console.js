@@ -807,7 +807,7 @@ async function askToMove(motion, speed = 1) {
   await free(); // it is drawn at once, and calm from then on
   L.busy = false;
   if (question && asked.seen === S.id && asked.stopped === S.stopped) {
-    L.question = { ...question, asked: { ...asked, motion: question.motion, speed: question.motion === "rehearsal" ? speed : 1 } };
+    L.question = { ...question, asked: { ...asked, motion: question.motion, speed: question.motion === "rehearsal" ? speed : 1, stood: question.stood } };
     calm();
   }
   draw();

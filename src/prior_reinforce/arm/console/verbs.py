@@ -84,6 +84,8 @@ class Execute(Seen):
     """What a person was asked for (`Question.motion`)."""
     speed: float = 1.0
     """Share of the plan's own speed, of a rehearsal."""
+    stood: dict[str, float] = {}
+    """`Question.stood`: where the arm stood when a person was asked."""
 
 
 class Question(Struct):
@@ -99,6 +101,8 @@ class Question(Struct):
     """See `is_fast`."""
     refused: str = ""
     """Why the arm refuses the plan; empty if it does not."""
+    stood: dict[str, float] = {}
+    """Where each of the plan's columns stands."""
 
 
 class Reached(Struct):
@@ -232,7 +236,8 @@ class Verbs:
             motion = body.motion if look.there else "approach"
             question = ask_to_move(workspace, trial, look, motion, body.speed)
             refused = look.refused or (look.approach_refused if motion == "approach" else "")
-            return Question(question, say_look(look), motion, is_fast(motion, body.speed), refused)
+            fast = is_fast(motion, body.speed)
+            return Question(question, say_look(look), motion, fast, refused, look.pose)
 
     def execute(self, body: Execute) -> ConsoleState:
         """Begin to execute the plan that was seen; returns once the journal says so."""
@@ -373,6 +378,7 @@ class Verbs:
                     motion=body.motion,
                     speed=body.speed,
                     stop_seen=stop_seen,
+                    stood=body.stood,
                 )
         except BaseException as error:
             self.publish({"error": f"trial {body.trial}: {error}"})

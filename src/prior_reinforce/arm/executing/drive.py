@@ -64,6 +64,7 @@ _SLOW: Mapping[Kind, float] = {"angle": 0.3, "length": 0.1, "share": 0.5}
 joints of an FR3 do, at which a person steps back in time."""
 _WAY = "the way from where the arm stands to the plan's first frame"
 _PLAN = "the plan from where the arm stands"
+_ASKED = "where it stood when a person was asked"
 _APPROACH_DT, _SHORTEST = 0.02, 0.5
 """Between frames of an approach, and its shortest duration, in [s]."""
 _START_TOLERANCE: Mapping[Kind, float] = {"angle": 0.002, "length": 0.0005, "share": 0.005}
@@ -83,6 +84,9 @@ class Request(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Share of the plan's own speed."""
     limits: RobotLimits | None = None
     """Of the workspace's robot; the way to the plan's first frame is held against them too."""
+    stood: dict[str, float] = {}
+    """Where each of the plan's columns stood when a person was asked: an approach begins there, or
+    it is not the one that was said yes to. Empty where nobody looked."""
 
 
 class Look(msgspec.Struct, frozen=True):
@@ -196,9 +200,12 @@ def approach(
 
 
 def say_distance(
-    off: Float[np.ndarray, " D"], form: PlanFormat, settings: GateSettings
+    off: Float[np.ndarray, " D"],
+    form: PlanFormat,
+    settings: GateSettings,
+    place: str = "the start pose",
 ) -> tuple[str, bool]:
-    """Say what is off most in each unit from a plan's first frame, and whether all is near enough.
+    """Say what is off most in each unit from a place, and whether all is near enough to it.
 
     `settings` allow so much (`errors_of`); a unit of which they say nothing is named, and must not
     be off at all.
@@ -211,7 +218,7 @@ def say_distance(
     for unit, (distance, name) in worst.items():
         allowed = settings.errors_of(unit)
         seen = round(distance, 4)  # what is less is a rounding error or an encoder's noise
-        text = f"{seen:.3g} {unit} ({name}) from the start pose"
+        text = f"{seen:.3g} {unit} ({name}) from {place}"
         if allowed is None:
             text += f", which is held against nothing: add {unit} to errors in [gate]"
             there = there and seen == 0
@@ -297,6 +304,11 @@ class _Prepared:
     def motions(self) -> dict[str, Plan]:
         """What is to be executed, one after the other, by name; limits hold for all of it."""
         if self._request.motion == "approach":
+            stood = {**self._here, **self._request.stood}
+            off = np.abs([stood[name] - here for name, here in self._here.items()])
+            said, same = say_distance(off, self._form, self._request.gate, _ASKED)
+            if not same:
+                raise ConfigurationError(f"{said}: ask again")
             return {_WAY: self.to_start}
         if not self._there:
             raise ConfigurationError(f"{self._said}; move it there, or ask again with --approach")
@@ -339,6 +351,8 @@ def _keep(path: MeasuredPath, prepared: _Prepared, folder: Path) -> str:
             f"what {arm} measured is not kept: t must be (T,) and q (T, {d}), got {t.shape} and "
             f"{q.shape}"
         )
+    if not (np.isfinite(t).all() and np.isfinite(q).all()):
+        return f"what {arm} measured is not kept, since not all of it is finite"
     if len(t):
         np.savez(folder / PATH_FILE, t=t, q=q[:, prepared.channels])
     return ""

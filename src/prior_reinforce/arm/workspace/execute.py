@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Literal
 
@@ -64,13 +64,15 @@ def execute(
     speed: float = 1.0,
     show: Callable[[str], None] | None = None,
     stop_seen: int | None = None,
+    stood: Mapping[str, float] | None = None,
 ) -> MotionResult:
     """Execute a trial's plan by a command or by the manifest's arm, as a person saw it, once.
 
     A motion that is no trial, which an arm alone makes, is noted likewise, and the plan may be
     executed afterwards. `time_limit` is of a command, of an arm it is beyond the plan's own
     duration, in [s]; `speed`, of a rehearsal, is a share of the plan's own. After a stop since
-    `stop_seen` (`last_stop` when it was asked for; now if not given), nothing begins.
+    `stop_seen` (`last_stop` when it was asked for; now if not given), nothing begins. An approach
+    begins where the arm `stood` when a person was asked (`Look.pose`), or not at all.
 
     TrialStateError if it was stopped since, executed already, is not open, or another program
     executes one; RobotLimitError if the plan breaks a limit of now; ConfigurationError if the
@@ -82,7 +84,7 @@ def execute(
             f"a rehearsal has a share of the plan's speed above 0 and below 1, and nothing "
             f"else has; got {motion} at {speed}"
         )
-    text = _command(workspace, command, motion, speed)
+    text = _command(workspace, command, motion, speed, stood)
     check_command(text, time_limit=time_limit)
     workspace.read_manifest()
     arm = workspace.manifest.arm
@@ -99,7 +101,8 @@ def execute(
         if isinstance(command, ArmSettings):
             time_limit += float(plan.times[-1]) / speed
         # The gate has read it again; a person said yes to what it said before.
-        if workspace.manifest.arm != arm or text != _command(workspace, command, motion, speed):
+        as_now = _command(workspace, command, motion, speed, stood)
+        if workspace.manifest.arm != arm or text != as_now:
             raise _another_arm(workspace)
         if lock.revoked():
             raise TrialStateError(
@@ -249,7 +252,11 @@ def ask_to_move(
 
 
 def _command(
-    workspace: Workspace, command: str | ArmSettings, motion: Motion | Literal["look"], speed: float
+    workspace: Workspace,
+    command: str | ArmSettings,
+    motion: Motion | Literal["look"],
+    speed: float,
+    stood: Mapping[str, float] | None = None,
 ) -> str:
     """The text of a command, or of the program that lets an arm's executor move it."""
     manifest = workspace.manifest
@@ -259,7 +266,8 @@ def _command(
         return command
     if manifest.driven_by != command:
         raise _another_arm(workspace)
-    return drive_command(Request(command, manifest.gate, motion, speed, manifest.robot))
+    request = Request(command, manifest.gate, motion, speed, manifest.robot, dict(stood or {}))
+    return drive_command(request)
 
 
 def _another_arm(workspace: Workspace) -> ConfigurationError:
