@@ -36,7 +36,8 @@ def _say_trial(now: Standing, trial: Trial) -> str:
     if trial.reading is not None:
         seen = say_reading(trial.reading, now.manifest.outcome_format)
         seen = f"reached ({seen})" if trial.hit else seen
-        return f"{seen}, {trial.surprise}" if trial.surprise else seen
+        said = f"{seen}, {trial.surprise}" if trial.surprise else seen
+        return "; executed, ".join(filter(None, [said, execution_warning(now, trial)]))
     match now.state.stage(trial):
         case "voided":
             return f"void: {trial.note}" if trial.note else "void"
@@ -127,16 +128,18 @@ def execution_warning(now: Standing, trial: Trial) -> str:
         return ""
     warnings = []
     if ended.outcome == "aborted":
-        warnings.append(f"but aborted: {ended.reason or 'no reason was given'}")
+        warnings.append(f"aborted: {ended.reason or 'no reason was given'}")
+    elif ended.reason:
+        warnings.append(ended.reason)
     for which, distances, says in (
-        (0, ended.start_error, "but began {} from the plan's first frame, more than {:g}"),
-        (1, ended.tracking_rms, "but went {} rms off the plan, more than {:g}"),
+        (0, ended.start_error, "began {} from the plan's first frame, more than {:g}"),
+        (1, ended.tracking_rms, "went {} rms off the plan, more than {:g}"),
     ):
         for unit, distance in distances.items():
             allowed = gate.errors_of(unit)
             if allowed is not None and distance > allowed[which]:
                 warnings.append(says.format(f"{distance:.3g} {unit}", allowed[which]))
-    return plain("; ".join(warnings))
+    return plain(f"but {'; '.join(warnings)}") if warnings else ""
 
 
 def call(folder: Path, command: str, *words: object) -> str:
@@ -209,8 +212,9 @@ def execute_step(now: Standing, trial: Trial) -> str:
     if arm is None:
         return call(now.folder, "ask", '--run "COMMAND {plan}"')
     flags = ["--execute"]
-    if trial.number in now.state.cut_off:
+    if cut_off := now.state.cut_off.get(trial.number):
         flags.append("--approach")
+        flags += ["--rehearse 0.2"] if cut_off == "rehearsal" else []
     return call(now.folder, "ask", *flags)
 
 
