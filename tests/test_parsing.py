@@ -631,3 +631,48 @@ def test_the_sign_that_a_word_was_given_is_said_where_it_has_none_of_its_own():
 def test_an_error_farther_than_any_arm_throws_is_refused_whatever_its_unit(text):
     with pytest.raises(InvalidFeedbackError, match="farther than any arm throws"):
         from_words(text)
+
+
+SHOWN = np.array([[0.9, -0.1], [1.2, 0.15]])
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [
+        ("1.05 10cm", "1.05"),
+        ("1.05 -10 cm", "1.05"),
+        ("1.05 ahead, 10cm left", "1.05"),
+        ("1 ahead, 0.1 left", "1"),
+    ],
+)
+def test_a_number_that_may_be_in_metres_is_not_read_in_centimetres_unasked(text, number):
+    says = rf"{number} has no unit; say {number}cm or {number}m"
+    with pytest.raises(InvalidFeedbackError, match=says):
+        read_place(text, OutcomeFormat.metres(2), SHOWN)
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("92 10cm", [0.92, 0.1]),
+        ("92 ahead, 1 left", [0.92, 0.01]),
+        ("0 10cm", [0.0, 0.1]),
+        ("5 10cm", [0.05, 0.1]),
+        ("1.05m 10cm", [1.05, 0.1]),
+        ("1.05 0.1", [1.05, 0.1]),
+    ],
+)
+def test_centimetres_that_can_be_nothing_else_are_read(text, place):
+    assert read_place(text, OutcomeFormat.metres(2), SHOWN) == pytest.approx(place)
+
+
+@pytest.mark.parametrize("text", ["5cm -2cm", "5 cm, -2 cm", "50mm -0.02m"])
+def test_an_error_may_be_numbers_with_units_in_order(text):
+    reading = from_words(text, OutcomeFormat.metres(2))
+    assert reading.error_seen == pytest.approx([0.05, -0.02])
+
+
+@pytest.mark.parametrize("text", ["0.05 -2cm", "5cm", "5cm - 2cm"])
+def test_an_error_in_numbers_has_a_unit_each(text):
+    with pytest.raises(InvalidFeedbackError, match="cannot read"):
+        from_words(text, OutcomeFormat.metres(2))

@@ -213,7 +213,8 @@ def test_where_it_ended_may_have_a_spread_behind_each_number(run, folder):
 @pytest.mark.filterwarnings("ignore:goal 0.9 cm ahead")
 def test_numbers_that_take_the_unit_of_the_last_are_said_to(run, folder):
     spoken = "numbers without a unit are centimetres"
-    assert spoken in run("goal", folder, "0.9", "5cm")[1]
+    assert spoken in run("goal", folder, "92", "5cm")[1]
+    assert "say 0.9cm or 0.9m" in run("goal", folder, "0.9", "5cm")[2]
     assert spoken not in run("goal", folder, "0.9", "0.05")[1]
     assert spoken not in run("goal", folder, "92cm ahead, 5 left")[1]
     run("goal", folder, "0.9", "0.05")
