@@ -1,5 +1,6 @@
 """Recording at an arm: by the clock, and by keys at a terminal."""
 
+import errno
 import re
 import time
 from contextlib import suppress
@@ -128,6 +129,7 @@ def test_an_arm_that_is_unplugged_keeps_what_was_recorded(run, folder, tmp_path)
     name_arm(folder, tmp_path / "arm", kind="unplugged")
     _, _, refused = run("record", folder, *BY_CLOCK[:3], "0.2", "--pause", "0.1")
     assert "does not answer any more" in refused
+    assert f"take-1; next: prior-reinforce import {folder} {folder}/recordings/1" in refused
     assert (folder / "recordings/1/take-1.npz").is_file()
 
 
@@ -158,3 +160,57 @@ def test_takes_are_cut_dropped_named_and_placed_by_keys(folder, tmp_path):
         "outcomes.csv",
     ]
     assert re.search(r"^good,0\.9,0\.05,", (recorded / "outcomes.csv").read_text(), re.MULTILINE)
+
+
+@pytest.fixture
+def session(tmp_path):
+    """Takes of a hand, without an arm; what is answered is `named`."""
+    shown = parse_manifest(manifest(), tmp_path / "workspace.toml")
+    terminal = SimpleNamespace(line=lambda question: session.named)
+    session = _Session(shown, tmp_path, [0, 1], None, terminal, asks=False)
+    session.named = ""
+    return session
+
+
+def take(session):
+    session.toggle()
+    for i in range(12):
+        session.add(GuidedState(i / 100, *2 * [np.array([i, 0.0])]))
+    session.toggle()
+
+
+def test_a_take_is_kept_without_a_picture_where_none_can_be_written(
+    session, tmp_path, monkeypatch, capsys
+):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("prior_reinforce.report.style.save_figure", full)
+    take(session)
+    assert "no picture: " in capsys.readouterr().out
+    assert (tmp_path / "take-1.npz").is_file()
+    session.named = "good"
+    session.name_last()
+    assert (tmp_path / "good.npz").is_file()
+    take(session)
+    assert [*session.taken] == ["good", "take-2"]
+
+
+@pytest.mark.parametrize(
+    ("named", "why"), [("a/b", "is no name"), (".a", "is no name"), ("take-1", "is a take-1")]
+)
+def test_a_name_that_cannot_be_given_is_refused_with_its_reason(session, capsys, named, why):
+    take(session)
+    session.named = named
+    session.name_last()
+    assert re.search(f"it stays take-1: .*{why}", capsys.readouterr().out)
+
+
+def test_takes_before_an_interruption_are_named_with_their_import(run, folder, monkeypatch):
+    def interrupt(command, workspace, source):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Import, "read_into", interrupt)
+    status, _, err = run("record", folder, *BY_CLOCK)
+    assert status == 130
+    assert f"take-4; next: prior-reinforce import {folder} {folder}/recordings/1" in err

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import select
+import shlex
 import sys
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
@@ -22,12 +24,18 @@ from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.outcomes import OUTCOMES_FILE, Place, keep_places
 from prior_reinforce.arm.workspace.folder import RECORDINGS
 from prior_reinforce.arm.workspace.manifest import Manifest
+from prior_reinforce.arm.workspace.text import call
 from prior_reinforce.arm.workspace.workspace import Workspace
+from prior_reinforce.commands import warn
 from prior_reinforce.commands.base import OnWorkspace
 from prior_reinforce.commands.importing import Import
 from prior_reinforce.commands.outcome_questions import ask_place
 from prior_reinforce.commands.questions import agrees
-from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
+from prior_reinforce.errors import (
+    ConfigurationError,
+    InvalidDemonstrationsError,
+    PriorReinforceError,
+)
 from prior_reinforce.files import named_disk_errors
 from prior_reinforce.plans.plan_format import PlanFormat
 from prior_reinforce.terminal import plain
@@ -111,10 +119,12 @@ class Record(OnWorkspace):
             session = _Session(manifest, folder, channels, self.motion, terminal, asks)
             then = "it follows its leader" if guiding == "led" else "move it by hand"
             print(f"reading {watch.arm.model}; {then} now", flush=True)
-            if asks:
-                _by_keys(watch, session)
-            else:
-                self._by_the_clock(watch, session)
+            again = call(workspace.folder, "import", shlex.quote(str(folder)))
+            with _said_if_ended(session, again, KeyboardInterrupt, PriorReinforceError):
+                if asks:
+                    _by_keys(watch, session)
+                else:
+                    self._by_the_clock(watch, session)
             if session.open is not None:
                 session.discard()
         if not session.taken:
@@ -123,7 +133,8 @@ class Record(OnWorkspace):
             raise InvalidDemonstrationsError("nothing was recorded; record again")
         options = ReadOptions(format="npz", units=manifest.format.units)
         words = (str(workspace.folder), str(folder))
-        Import(words=words, options=options, append=self.append).read_into(workspace, folder)
+        with _said_if_ended(session, again, KeyboardInterrupt):
+            Import(words=words, options=options, append=self.append).read_into(workspace, folder)
 
     def _by_the_clock(self, watch: Watch, session: _Session) -> None:
         """Wait, take, end, by the arm's own time."""
@@ -156,6 +167,17 @@ def _by_keys(watch: Watch, session: _Session) -> None:
             return
         if pressed and session.open is None:
             watch.forget()
+
+
+@contextmanager
+def _said_if_ended(session: _Session, again: str, *by: type[BaseException]) -> Iterator[None]:
+    """Say which takes are kept, and how they are imported, where recording is ended by an error."""
+    try:
+        yield
+    except by:
+        if session.taken:
+            warn(f"kept in {session.folder}: {', '.join(session.taken)}; next: {again}")
+        raise
 
 
 def _state(watch: Watch) -> GuidedState:
@@ -212,10 +234,14 @@ class _Session:
         form = self.manifest.format
         with named_disk_errors(self.folder):
             take.save(self.folder, form, self.channels, kind)
-            picture = self.folder / f"{take.name}.png"
-            _draw(take, form, self.channels, kind, picture)
         self.taken[take.name] = None
-        print(f"{take.name}: {take.t[-1]:.2f} s, its {kind} motion; picture: {picture}", flush=True)
+        picture = self.folder / f"{take.name}.png"
+        said = f"picture: {picture}"
+        try:
+            _draw(take, form, self.channels, kind, picture)
+        except OSError as error:  # the take is kept without it
+            said = f"no picture: {error}"
+        print(f"{take.name}: {take.t[-1]:.2f} s, its {kind} motion; {said}", flush=True)
         if led:
             lag = take.lag(self.channels)
             print(f"the arm was {1e3 * lag:.0f} ms behind what it was told: lag = {lag:.3f}")
@@ -240,11 +266,17 @@ class _Session:
             return
         old = [*self.taken][-1]
         new = plain(self.terminal.line(f"another name for {old}: ")).strip()
-        if not new or "/" in new or new.startswith(".") or (self.folder / f"{new}.npz").exists():
-            print(f"it stays {old}", flush=True)
+        why = ""
+        if "/" in new or new.startswith("."):
+            why = f": {new} is no name of a file"
+        elif new and (self.folder / f"{new}.npz").exists():
+            why = f": there is a {new} already"
+        if why or not new:
+            print(f"it stays {old}{why}", flush=True)
             return
         for suffix in _SUFFIXES:
-            (self.folder / f"{old}{suffix}").rename(self.folder / f"{new}{suffix}")
+            with suppress(FileNotFoundError):  # there may be no picture
+                (self.folder / f"{old}{suffix}").rename(self.folder / f"{new}{suffix}")
         self.taken[new] = self.taken.pop(old)
         if self.taken[new] is not None:
             self._keep()
