@@ -1,5 +1,8 @@
 """Outcomes that are missing are asked for."""
 
+import re
+import shlex
+
 import numpy as np
 
 from prior_reinforce.arm.workspace.workspace import Workspace
@@ -74,3 +77,17 @@ def test_an_answer_may_be_taken_back_and_an_episode_skipped(run, folder, tmp_pat
         np.testing.assert_allclose(
             workspace.demonstrations.outcomes_seen, demonstrations().outcomes_seen[[0, 2, 3]]
         )
+
+
+def test_the_import_that_is_named_after_skipping_works_as_it_is_typed(
+    run, folder, tmp_path, monkeypatch
+):
+    recordings(tmp_path / "two throws", outcomes=[])
+    typing(monkeypatch, ["skip", "0.8 0.2", "1.0 -0.2", "1.0 0.2"])
+    status, out, _ = run("import", folder, "two throws")
+    assert status == 0
+    (command,) = re.findall(r"; again: prior-reinforce (.*)", out)
+    monkeypatch.setattr("sys.stdin.isatty", lambda: False)
+    assert run(*shlex.split(command))[0] == 0
+    with Workspace(folder) as workspace:
+        assert workspace.demonstrations.n == 3

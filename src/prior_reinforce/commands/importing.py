@@ -138,11 +138,11 @@ class Import(OnWorkspace):
             source = recordings.source
             answers = ask_for_outcomes(workspace.folder, source, known, selection, form)
             if answers is not None:
-                print(
-                    f"outcomes kept in {answers.where}; to import again: --outcomes {answers.where}"
-                )
-                known = answers
-                selection = selection.without(missing_outcomes(selection.episodes, answers))
+                known, skipped = answers, missing_outcomes(selection.episodes, answers)
+                again = f"--outcomes {shlex.quote(str(answers.where))}"
+                left = f"--leave-out {shlex.join(skipped)}" * bool(skipped)
+                print(f"outcomes kept in {answers.where}; again: {self._command(again, left)}")
+                selection = selection.without(skipped)
                 if not selection.recordings:
                     raise InvalidDemonstrationsError("no episode is left; import again")
         result = recordings.demonstrations(selection, known, wanted)
