@@ -5,12 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from prior_reinforce.arm.recordings.clock import (
-    clock_among,
-    clock_of,
-    declared_rate,
-)
+from prior_reinforce.arm.recordings import clock
+from prior_reinforce.arm.recordings.clock import clock_among
 from prior_reinforce.arm.recordings.options import ReadOptions
+from prior_reinforce.arm.recordings.rates import DeclaredRate, declared_rate
 from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
@@ -18,30 +16,32 @@ from prior_reinforce.errors import (
 )
 
 
+def clock_of(episode, count, *, rate=None, time_unit=None, **of_file):
+    options = ReadOptions(rate=rate, time_unit=time_unit)
+    return clock.clock_of(episode, count, options, **of_file)
+
+
 def test_frames_without_times_need_a_rate():
-    clock = clock_of("a", 3, rate=20.0)
-    np.testing.assert_allclose(clock.times, [0, 0.05, 0.1])
-    assert (clock.source, clock.ambiguities) == ("the given rate", ())
+    found = clock_of("a", 3, rate=20.0)
+    np.testing.assert_allclose(found.times, [0, 0.05, 0.1])
+    assert (found.source, found.ambiguities) == ("the given rate", ())
     with pytest.raises(FileFormatError, match=r"episode a holds neither times nor a rate.*--rate"):
         clock_of("a", 3)
 
 
 def test_a_given_rate_agrees_with_a_declared_one_or_is_refused():
-    assert clock_of("a", 3, name="fps", own_rate=50.0).source == "fps in the file"
-    clock = clock_of("a", 3, name="fps", own_rate=50.0, rate=51.0)
-    np.testing.assert_allclose(clock.times, [0.0, 1 / 51, 2 / 51])
+    assert clock_of("a", 3, declared=DeclaredRate(50.0, "fps")).source == "fps in the file"
+    found = clock_of("a", 3, declared=DeclaredRate(50.0, "fps"), rate=51.0)
+    np.testing.assert_allclose(found.times, [0.0, 1 / 51, 2 / 51])
     with pytest.raises(ConfigurationError, match=r"--rate 100, but fps .* 50 .*--time-column none"):
-        clock_of("a", 3, name="fps", own_rate=50.0, rate=100.0)
-    unread = ReadOptions(rate=100.0, time_column="none").clock("a", 3, name="fps", own_rate=50.0)
+        clock_of("a", 3, declared=DeclaredRate(50.0, "fps"), rate=100.0)
+    unread = ReadOptions(rate=100.0, time_column="none")
+    unread = clock.clock_of("a", 3, unread, declared=DeclaredRate(50.0, "fps"))
     np.testing.assert_allclose(unread.times, [0.0, 0.01, 0.02])
     # At 5 frames an hour no arm is recorded.
-    assert clock_of("a", 3, name="dt", own_rate=1e-3 * 5, rate=20.0).period == pytest.approx(0.05)
-
-
-def test_of_two_declared_rates_the_given_one_is_taken():
-    both = {"dt": 0.02, "fps": 30}
-    assert declared_rate("a", both, given=30.0) == {"own_rate": 30, "rate_name": "fps"}
-    assert declared_rate("a", both, given=50.0)["rate_name"] == "dt"
+    assert clock_of(
+        "a", 3, declared=DeclaredRate(1e-3 * 5, "dt"), rate=20.0
+    ).period == pytest.approx(0.05)
 
 
 @pytest.mark.parametrize(
@@ -50,14 +50,14 @@ def test_of_two_declared_rates_the_given_one_is_taken():
 )
 def test_times_that_cannot_be_seconds_are_a_doubt_with_a_remedy(rate, unit, looks):
     stamps = 5e3 + np.arange(200) / rate / unit
-    clock = clock_of("a", 200, stamps=stamps, name="t")
-    (doubt,) = clock.ambiguities
+    found = clock_of("a", 200, stamps=stamps, name="t")
+    (doubt,) = found.ambiguities
     assert doubt.option == f"--time-unit {looks}"
     assert f"in {looks} {rate} Hz" in doubt.what
     said = clock_of("a", 200, stamps=stamps, name="t", time_unit=looks)
     assert said.ambiguities == ()
     np.testing.assert_allclose(said.times, np.arange(200) / rate, atol=1e-9)
-    np.testing.assert_array_equal(said.times, clock.times)
+    np.testing.assert_array_equal(said.times, found.times)
 
 
 def test_a_unit_in_the_name_or_of_the_format_is_no_doubt():
@@ -73,19 +73,19 @@ def test_a_unit_in_the_name_or_of_the_format_is_no_doubt():
     [("time [0.1 ms]", 100.0), ("t [100us]", 100.0), ("t (10 ms)", 1.0), ("t [0.01 s]", 1.0)],
 )
 def test_a_unit_of_time_may_stand_behind_a_number(head, step):
-    clock = clock_of("a", 5, stamps=np.arange(5) * step, name=head)
-    assert (clock.times[-1], clock.ambiguities) == (pytest.approx(0.04), ())
+    found = clock_of("a", 5, stamps=np.arange(5) * step, name=head)
+    assert (found.times[-1], found.ambiguities) == (pytest.approx(0.04), ())
     said = clock_of("a", 5, stamps=np.arange(5) * step, name=head, rate=100.0)
-    np.testing.assert_allclose(said.times, clock.times)
-    assert declared_rate("a", {"dt [10 ms]": 1.0})["own_rate"] == pytest.approx(100.0)
+    np.testing.assert_allclose(said.times, found.times)
+    assert declared_rate("a", {"dt [10 ms]": 1.0}).hertz == pytest.approx(100.0)
 
 
 @pytest.mark.parametrize("rate", [5, 100, 1000])
 def test_plausible_seconds_are_taken_as_they_are(rate):
-    clock = clock_of("a", 9, stamps=np.arange(9) / rate, name="t")
-    assert clock.ambiguities == ()
-    assert clock.source == "t in s"
-    assert clock.period == pytest.approx(1 / rate)
+    found = clock_of("a", 9, stamps=np.arange(9) / rate, name="t")
+    assert found.ambiguities == ()
+    assert found.source == "t in s"
+    assert found.period == pytest.approx(1 / rate)
 
 
 def test_times_that_fit_no_unit_say_so():
@@ -98,30 +98,30 @@ def test_times_that_fit_no_unit_say_so():
 )
 def test_a_unit_that_makes_no_throw_is_a_doubt_although_it_was_said(unit, said, looks):
     stamps = np.arange(140) * 0.0125 / unit
-    clock = clock_of("a", 140, stamps=stamps, name="t", time_unit=said)
-    (doubt,) = clock.ambiguities
+    found = clock_of("a", 140, stamps=stamps, name="t", time_unit=said)
+    (doubt,) = found.ambiguities
     assert doubt.option == f"--time-unit {looks}"
     assert f"in {said}, as --time-unit says, would be" in doubt.what
     assert f"in {looks} 80 Hz and 1.74 s long: it looks like {looks}" in doubt.what
-    assert clock.period == pytest.approx(0.0125)
+    assert found.period == pytest.approx(0.0125)
 
 
 def test_slow_seconds_are_taken_when_said():
-    clock = clock_of("a", 9, stamps=np.arange(9.0), name="t", time_unit="s")
-    assert clock.ambiguities == ()
-    assert clock.period == 1
+    found = clock_of("a", 9, stamps=np.arange(9.0), name="t", time_unit="s")
+    assert found.ambiguities == ()
+    assert found.period == 1
 
 
 def test_key_frames_of_a_throw_are_in_seconds():
     stamps = np.array([0, 0.4, 0.65, 0.9, 1.15, 1.4, 1.99])
-    clock = clock_of("a", 7, stamps=stamps, name="t")
-    assert [doubt.option for doubt in clock.ambiguities] == ["--time-unit s"]
-    assert clock.times[-1] == pytest.approx(1.99)
+    found = clock_of("a", 7, stamps=stamps, name="t")
+    assert [doubt.option for doubt in found.ambiguities] == ["--time-unit s"]
+    assert found.times[-1] == pytest.approx(1.99)
 
 
 def test_a_column_that_counts_frames_needs_the_rate():
-    clock = clock_of("a", 3, stamps=np.array([7, 8, 10]), name="t", time_unit="frame", rate=100)
-    np.testing.assert_allclose(clock.times - clock.times[0], [0, 0.01, 0.03])
+    found = clock_of("a", 3, stamps=np.array([7, 8, 10]), name="t", time_unit="frame", rate=100)
+    np.testing.assert_allclose(found.times - found.times[0], [0, 0.01, 0.03])
     with pytest.raises(ConfigurationError, match=r"counts frames.*--rate"):
         clock_of("a", 3, stamps=np.array([7, 8, 10]), name="t", time_unit="frame")
     (doubt,) = clock_of("a", 3, stamps=np.array([7, 8, 9]), name="t").ambiguities
@@ -146,26 +146,13 @@ def test_a_rate_that_disagrees_with_the_times_is_refused_and_one_that_agrees_is_
      ("dt", 2e-5, "5e+04")],
 )  # fmt: skip
 def test_a_declared_rate_at_which_no_arm_is_recorded_is_a_doubt(name, number, likely):
-    (doubt,) = clock_of("a", 100, **declared_rate("a", {name: number})).ambiguities
+    declared = declared_rate("a", {name: number})
+    (doubt,) = clock_of("a", 100, declared=declared).ambiguities
     assert doubt.what.endswith(f"it looks like {likely}")
     assert doubt.option == f"--rate {float(likely.split()[0]):g}"
-    assert clock_of("a", 100, **declared_rate("a", {name: number}), rate=50).ambiguities == ()
-
-
-@pytest.mark.parametrize(
-    ("said", "rate"),
-    [({"fps": 50}, 50), ({"dt_ms": 20, "Frame Rate": 50}, 50), ({"control_freq": 20}, 20),
-     ({"sampling_frequency": 125, "mass": 3}, 125), ({"time_step": 0.02}, 50), ({"hz": 30}, 30)],
-)  # fmt: skip
-def test_rates_that_files_declare(said, rate):
-    found = declared_rate("a", said)
-    assert found == {"own_rate": pytest.approx(rate), "rate_name": next(iter(said))}
-
-
-def test_declared_rates_that_contradict_each_other_or_are_none():
-    with pytest.raises(FileFormatError, match="dt says 50 frames a second, but fps 30; take one"):
-        declared_rate("a", {"dt": 0.02, "fps": 30})
-    assert declared_rate("a", {"mass": 3.0, "generate": 1, "update": 2}) == {}
+    assert (
+        clock_of("a", 100, declared=declared_rate("a", {name: number}), rate=50).ambiguities == ()
+    )
 
 
 @pytest.mark.parametrize(("name", "unit"), [("t_ms", None), ("t", "ms")])
@@ -176,8 +163,8 @@ def test_a_unit_of_the_file_that_makes_no_recording_is_a_doubt(name, unit):
     assert f"{name} in ms, as its {by} says, would be 1e+05 Hz and 0.00199 s long" in doubt.what
     assert doubt.option == "--time-unit s"
     for said, period in (("s", 0.01), ("ms", 1e-5)):
-        clock = clock_of("a", 200, stamps=stamps, name=name, unit=unit, time_unit=said)
-        assert (clock.ambiguities, clock.period) == ((), pytest.approx(period))
+        found = clock_of("a", 200, stamps=stamps, name=name, unit=unit, time_unit=said)
+        assert (found.ambiguities, found.period) == ((), pytest.approx(period))
 
 
 def test_serial_dates_are_in_days():
@@ -185,24 +172,24 @@ def test_serial_dates_are_in_days():
     for said in (None, "s"):
         (doubt,) = clock_of("a", 200, stamps=stamps, name="time", time_unit=said).ambiguities
         assert doubt.option == "--time-unit day"
-    clock = clock_of("a", 200, stamps=stamps, name="time", time_unit="day")
-    np.testing.assert_allclose(clock.times, np.arange(200) / 100, atol=1e-6)
+    found = clock_of("a", 200, stamps=stamps, name="time", time_unit="day")
+    np.testing.assert_allclose(found.times, np.arange(200) / 100, atol=1e-6)
 
 
 @pytest.mark.parametrize("rate", [None, 125.0])
 def test_ticks_since_the_year_1_are_of_100_ns(rate):
     stamps = 6.39e17 + np.arange(200) * 80_000
-    clock = clock_of("a", 200, stamps=stamps, name="Ticks", rate=rate)
-    assert clock.ambiguities == ()
-    np.testing.assert_allclose(clock.times, np.arange(200) / 125, atol=2e-5)
+    found = clock_of("a", 200, stamps=stamps, name="Ticks", rate=rate)
+    assert found.ambiguities == ()
+    np.testing.assert_allclose(found.times, np.arange(200) / 125, atol=2e-5)
 
 
-@pytest.mark.parametrize("rate", [{"rate": 50.0}, {"own_rate": 50.0, "rate_name": "fps"}])
+@pytest.mark.parametrize("rate", [{"rate": 50.0}, {"declared": DeclaredRate(50.0, "fps")}])
 def test_a_counter_by_one_has_the_rate_of_its_frames_where_some_are_lost(rate):
     frames = np.array([7, 8, 9, 12, 13])
-    clock = clock_of("a", 5, stamps=frames, name="frame", **rate)
-    np.testing.assert_allclose(clock.times, frames / 50)
-    assert clock.ambiguities == ()
+    found = clock_of("a", 5, stamps=frames, name="frame", **rate)
+    np.testing.assert_allclose(found.times, frames / 50)
+    assert found.ambiguities == ()
 
 
 def test_other_ticks_are_asked_for_their_length():
@@ -224,29 +211,29 @@ def test_a_time_that_counts_down_is_named(rate):
 
 def test_a_rate_that_contradicts_the_name_of_a_recording_is_said():
     assert clock_of("throw_0_100Hz", 3, rate=100.0).source == "the given rate"
-    clock = clock_of("throw_4_12,5Hz", 3, rate=100.0)
-    assert clock.source == "the given rate (the name throw_4_12,5Hz says 12.5 Hz)"
-    assert clock.period == pytest.approx(0.01)
+    found = clock_of("throw_4_12,5Hz", 3, rate=100.0)
+    assert found.source == "the given rate (the name throw_4_12,5Hz says 12.5 Hz)"
+    assert found.period == pytest.approx(0.01)
 
 
 @pytest.mark.parametrize("rate", [200, 1000])
 def test_nanoseconds_since_2000_are_no_ticks(rate):
     stamps = 641_000_000_000_000_000 + np.arange(rate) * (1_000_000_000 // rate)
-    clock = clock_of("a", rate, stamps=stamps, name="timestamp", time_unit="ns")
-    assert clock.period == pytest.approx(1 / rate, rel=1e-3)
+    found = clock_of("a", rate, stamps=stamps, name="timestamp", time_unit="ns")
+    assert found.period == pytest.approx(1 / rate, rel=1e-3)
 
 
 def test_a_stated_unit_is_believed_of_ticks():
     ticks = 638_000_000_000_000_000 + np.arange(200) * 100_000
     assert clock_of("a", 200, stamps=ticks, name="n").period == pytest.approx(0.01, rel=1e-3)
-    clock = clock_of("a", 200, stamps=ticks, name="n", time_unit="us")
-    assert clock.period == pytest.approx(0.1, rel=1e-3)
+    found = clock_of("a", 200, stamps=ticks, name="n", time_unit="us")
+    assert found.period == pytest.approx(0.1, rel=1e-3)
 
 
 def test_a_rate_settles_the_unit_of_times():
     stamps = np.arange(200) * 10.0
-    clock = clock_of("a", 200, stamps=stamps, name="t", rate=100)
-    assert (clock.ambiguities, clock.source) == ((), "t in ms")
+    found = clock_of("a", 200, stamps=stamps, name="t", rate=100)
+    assert (found.ambiguities, found.source) == ((), "t in ms")
 
 
 def test_what_has_no_use_is_refused():
@@ -269,51 +256,27 @@ def test_nanoseconds_since_1970_keep_their_order():
 
 
 def test_times_that_are_no_numbers_are_left_to_the_recording():
-    clock = clock_of("a", 3, stamps=np.array([0.0, np.inf, np.inf]), name="t")
-    assert clock.ambiguities == ()
-    np.testing.assert_array_equal(clock.times, [0, np.inf, np.inf])
-
-
-@pytest.mark.parametrize(
-    ("stated", "given", "rate"),
-    [
-        ({"meta.fps": 50}, None, ("fps", 50)),
-        ({"meta.frame_rate": 50}, None, ("frame_rate", 50)),
-        ({"meta.timing.dt_ms": 20.0}, None, ("dt_ms", 50.0)),
-        ({"sample_time_ms": 20.0}, None, ("sample_time_ms", 50.0)),
-        ({"fps": 50, "cycle_time": 0.002}, None, ("fps", 50)),
-        ({"meta.fps": 50, "rate": np.array(50.0)}, None, ("rate", 50.0)),
-        ({"meta.fps": 50, "meta.camera.fps": 30}, None, ("fps", 50)),
-        ({"meta.fps": 50, "meta.robot.hz": 100}, 50.0, ("fps", 50)),
-        ({"meta.version": 2}, None, ()),
-    ],
-)
-def test_a_rate_deep_in_what_a_file_says_is_its_rate(stated, given, rate):
-    assert tuple(declared_rate("a.npz", stated, given).values()) == rate
-
-
-def test_two_rates_that_contradict_each_other_are_refused():
-    stated = {"meta.fps": 50, "meta.robot.dt": 0.01}
-    with pytest.raises(
-        FileFormatError, match=r"meta\.fps says 50 .*, but meta\.robot\.dt 100; .*-r"
-    ):
-        declared_rate("a.npz", stated)
-    with pytest.raises(FileFormatError, match=r"rate says 20 .*, but meta\.fps 50"):
-        declared_rate("a.npz", {"rate": np.array(20), "meta.fps": 50})
+    found = clock_of("a", 3, stamps=np.array([0.0, np.inf, np.inf]), name="t")
+    assert found.ambiguities == ()
+    np.testing.assert_array_equal(found.times, [0, np.inf, np.inf])
 
 
 @pytest.mark.parametrize(("count", "option"), [(280, "frame --rate HZ"), (2000, "ms")])
 def test_whole_numbers_called_t_count_frames_where_milliseconds_are_no_throw(count, option):
-    clock = clock_of("0", count, stamps=np.arange(count), name="t")
-    assert [one.option for one in clock.ambiguities] == [f"--time-unit {option}"]
+    found = clock_of("0", count, stamps=np.arange(count), name="t")
+    assert [one.option for one in found.ambiguities] == [f"--time-unit {option}"]
 
 
 def test_a_given_rate_beside_a_period_in_an_unknown_unit_is_held_against_it():
-    told = clock_of("a", 3, name="dt", own_rate=1 / 20, rate=100.0)
+    declared = DeclaredRate(1 / 20, "dt")
+    told = clock_of("a", 3, declared=declared, rate=100.0)
     assert all(rate in told.source for rate in ("50", "20"))
     assert told.period == pytest.approx(0.01)
     for rate in (50.0, 20.0):
-        assert clock_of("a", 3, name="dt", own_rate=1 / 20, rate=rate).source == "the given rate"
+        assert (
+            clock_of("a", 3, declared=DeclaredRate(1 / 20, "dt"), rate=rate).source
+            == "the given rate"
+        )
 
 
 def test_the_rate_of_each_frame_is_none_of_the_file():

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from prior_reinforce.arm.recordings.time_finder import (
-    FRAME,
     counts_down,
     find_times,
     is_clock,
@@ -14,6 +13,7 @@ from prior_reinforce.arm.recordings.time_finder import (
     skips_frames,
     tells_time,
 )
+from prior_reinforce.arm.recordings.units import FRAME
 from prior_reinforce.errors import FileFormatError
 
 T = np.arange(101) * 0.05

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.naming import OTHER_NAMES
+from prior_reinforce.arm.recordings.options import NO_COLUMN, ReadOptions
+from prior_reinforce.arm.recordings.rates import (
+    SAME_RATE,
+    DeclaredRate,
+    declared_rate,
+    either,
+    same_rate,
+)
 from prior_reinforce.arm.recordings.time_finder import (
     ARRAY_TIMES,
-    FRAME,
+    Clock,
     Columns,
     FoundTimes,
     Stamps,
@@ -27,20 +33,19 @@ from prior_reinforce.arm.recordings.time_finder import (
     is_throw,
     other_times,
     rises,
-    says_period,
     says_time,
     skips_frames,
 )
-from prior_reinforce.arm.recordings.units import SECONDS, Ambiguity, judge_unit, split_unit
+from prior_reinforce.arm.recordings.units import (
+    FRAME,
+    SECONDS,
+    Ambiguity,
+    judge_unit,
+    split_unit,
+)
 from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidDemonstrationsError
-from prior_reinforce.units import base_of, without_number
+from prior_reinforce.units import without_number
 
-if TYPE_CHECKING:
-    from prior_reinforce.arm.recordings.options import ReadOptions
-
-TIME_UNITS = (*SECONDS, FRAME)
-NO_COLUMN = "none"
-"""Value of `time_column` by which no times are read, and of `episode_column`."""
 _IN_BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*[^\W\d_][^\[\]()]*?)\s*[\])]\s*$")
 """`Time [weeks]`, a word in brackets."""
 _QUALIFIES = re.compile(
@@ -49,134 +54,45 @@ _QUALIFIES = re.compile(
 """Words that say what kind of time it is, and no unit."""
 _HERTZ = re.compile(r"(\d+(?:[.,]\d+)?)[ _-]?hz", re.I)
 """`throw_4_50Hz`."""
-SAME_RATE = 0.05
-"""Rates that differ by a smaller share are one. Ours: clocks of recorders jitter and drift."""
 _APART = 3.0
 """Frames by which two clocks of one recording may differ. Ours: jitter is a frame or two."""
 _BRIEF = 0.5
 """Seconds below which 0, 1, 2, ... count frames, and no milliseconds: a throw has rests. Ours."""
-_LOWEST_RATE, _HIGHEST_RATE = 1e-3, 1e6
-"""Declared frames a second beyond which a file is damaged. Ours."""
-_RATE = re.compile(
-    r"((control|sampl[a-z]*|frame|record[a-z]*)[ _]?)?(fps|fs|hz|rate|freq(uency)?)([ _]?hz)?"
-)
-"""What files call their frames a second."""
-
-
-def declared_rate(
-    where: object, said: Mapping[str, Any], given: float | None = None
-) -> dict[str, Any]:
-    """Return the rate that a file declares, if any, as `clock_of` takes it.
-
-    `said` are its numbers by name, for instance `fps` 50 or `dt_ms` 20, or by their place deep in
-    it, `meta.fps`; these count less. FileFormatError if two differ, and no rate is given that one
-    of them says.
-    """
-    found: dict[str, float] = {}
-    for name, value in sorted(said.items(), key=lambda item: "." in item[0]):
-        place, _, called = name.rpartition(".")
-        is_period, unit = says_period(called), split_unit(called, SECONDS)[1]
-        if OTHER_NAMES.search(place) or not (is_period or _RATE.fullmatch(called.lower())):
-            continue
-        if np.size(value) != 1 or np.asarray(value).dtype.kind not in "fiu":
-            raise FileFormatError(
-                f"{where}: {name} is no number; expected times t, or dt, or rate: mend it, or "
-                "leave it unread with --time-column none --rate HZ"
-            )
-        number = float(value) * base_of(unit or "s")[1]
-        found[name] = 1 / number if is_period and number else number
-    agree = [own for own in found.items() if given is not None and _same(given, own[1])]
-    first, of_first = next(iter((*agree, *found.items())), ("", 0.0))
-    for name, rate in found.items():
-        if given is None and not _same(rate, of_first):
-            raise FileFormatError(
-                f"{where}: {first} says {of_first:.4g} frames a second, but {name} {rate:.4g}; "
-                "take one: --rate"
-            )
-    return {"rate_name": first.rpartition(".")[2], "own_rate": of_first} if found else {}
-
-
-@dataclass(frozen=True, eq=False)
-class Clock:
-    """Times of an episode's frames, and their source."""
-
-    times: Times
-    """From any origin."""
-    source: str
-    """For a person: `t in ms`, `the given rate`."""
-    ambiguities: tuple[Ambiguity, ...] = ()
-    """What is only inferred of them."""
-
-    @property
-    def period(self) -> float:
-        """Median time between two frames, in [s]; nan where there is one frame."""
-        return float(np.median(np.diff(self.times))) if len(self.times) > 1 else math.nan
 
 
 def clock_of(
     episode: str,
     count: int,
+    options: ReadOptions,
     *,
     stamps: Stamps | None = None,
     name: str = "",
     unit: str | None = None,
-    own_rate: float | None = None,
-    rate_name: str = "",
-    rate: float | None = None,
-    time_unit: str | None = None,
+    declared: DeclaredRate | None = None,
 ) -> Clock:
-    """Return the times of an episode.
+    """Return the times of an episode from its time stamps, or where it has none from a frame rate.
 
     Args:
-        episode: For messages.
+        episode: Its name.
         count: T.
-        stamps: The file's own times; None where it has none.
+        options: The user's rate and unit of time. The rate must agree with the time stamps, and
+            with a declared rate that is plausible.
+        stamps: The file's time stamps; None where it has none.
         name: Name of their column or array.
         unit: Unit that the format fixes for them; None reads it from the name, or infers it.
-        own_rate: Rate that the file declares, in [Hz]; the stamps must agree with it.
-        rate_name: What the file calls that rate.
-        rate: Rate that the user gave. It must agree with stamps, and with a declared one that may
-            be.
-        time_unit: Unit that the user gave, one of `TIME_UNITS`.
+        declared: Frame rate that the file declares; time stamps must agree with it.
 
     Raises:
         ConfigurationError: An option contradicts the file, or has no use.
-        InvalidDemonstrationsError: Stamps that are not numbers, or of another length.
-        FileFormatError: Neither times nor a rate, or a declared rate that cannot be.
+        InvalidDemonstrationsError: Time stamps that are not numbers, or of another length.
+        FileFormatError: Neither time stamps nor a rate, or an impossible declared rate.
     """
-    if own_rate is not None and not _LOWEST_RATE < own_rate < _HIGHEST_RATE:
-        raise FileFormatError(
-            f"episode {episode}: {rate_name or name} says {own_rate:g} frames a second; mend it, "
-            "or leave it out"
-        )
+    if options.time_column == NO_COLUMN and options.rate is not None:
+        declared = None
+    if declared is not None:
+        declared.check(episode)
     if stamps is None:
-        if time_unit is not None:
-            raise ConfigurationError(
-                f"--time-unit {time_unit} is of a column of times, and episode {episode} has none; "
-                "drop it, or name the column"
-            )
-        own, name = rate or own_rate, rate_name or name
-        if own is None:
-            raise FileFormatError(
-                f"episode {episode} holds neither times nor a rate; give the rate in frames a "
-                "second: --rate"
-            )
-        times = np.arange(count) / own
-        likely = [] if own_rate is None else _likely_rates(name, own_rate)
-        if rate is None:
-            doubts = () if own_rate is None else _doubt_rate(name, own_rate, likely, count)
-            return Clock(times, f"{name} in the file", doubts)
-        is_said = any(_same(rate, each) for each in likely or [rate])
-        if own_rate in likely and not is_said:
-            raise ConfigurationError(
-                f"--rate {rate:g}, but {name} in the file says {own_rate:.4g} frames a second; "
-                "drop --rate, or leave the file's rate unread: --time-column none"
-            )
-        in_name = _HERTZ.search(episode)
-        stated = float(in_name[1].replace(",", ".")) if in_name else rate
-        said = "" if _same(rate, stated) else f" (the name {episode} says {stated:g} Hz)"
-        said += "" if is_said else f" ({name} in the file says {_or(likely)} Hz)"
-        return Clock(times, f"the given rate{said}")
+        return _clock_at_rate(episode, count, options, declared)
     try:
         numbers = np.asarray(stamps, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -188,74 +104,167 @@ def clock_of(
             f"episode {episode} has {count} frames, but {name} of shape {numbers.shape}; expected "
             "one time a frame"
         )
-    known = unit or split_unit(name, SECONDS)[1]
-    known, of_one = without_number(known) if known else (None, 1.0)  # of `t [0.1 ms]`
-    numbers = numbers * of_one
-    counts = not known and time_unit is None and is_counter(name, numbers)
-    if counts and (rate or own_rate):
-        steps = np.diff(numbers)
-        if np.all(steps >= 1) and 2 * np.sum(steps > 1) <= len(steps):  # by one, but for lost ones
-            known = FRAME
-    if known is None and time_unit is None and are_ticks(numbers):
-        numbers, known = (numbers - numbers[0]) * 100, "ns"
-    unknown = None if known or time_unit else _IN_BRACKETS.search(name)
-    if unknown is not None and not _QUALIFIES.fullmatch(unknown[1]):
-        raise FileFormatError(
-            f"episode {episode}: {name} is in {unknown[1]!r}, which is no known unit of time "
-            f"({', '.join(SECONDS)}): say it with --time-unit, or convert that column"
-        )
-    if FRAME in (time_unit, known):
-        frames = rate or own_rate
-        if frames is None or time_unit not in (None, FRAME):
-            raise ConfigurationError(
-                f"{name} counts frames, so the rate is wanted: add --rate, and no other --time-unit"
-            )
-        step = np.diff(numbers).min(initial=np.inf) if unit == FRAME else 1.0
-        return Clock(numbers / step / frames, f"{name}, frames at {frames:g} Hz")
-    if not np.all(np.isfinite(numbers)):
-        return Clock(numbers, name)  # the recording names the frame
-    if rises(-numbers):
-        raise InvalidDemonstrationsError(
-            f"episode {episode}: {name} falls with every frame, as what counts down does: write "
-            "its negative, or turn frames in reverse round, or give --time-column none --rate HZ"
-        )
-    # From the first on, since nanoseconds since 1970 are 0.2 us coarse as floats.
-    elapsed = numbers - (numbers[0] if count else 0.0)
-    period = float(np.median(np.diff(numbers))) if count > 1 else 0.0
-    if abs(period) not in (0.0, np.clip(abs(period), 1e-12, 1e15)):
-        raise FileFormatError(
-            f"episode {episode}: {name} steps by {period:g} a frame, which is no time in any unit; "
-            "mend it, or leave the times unread with --time-column none"
-        )
-    by = "its name says" if unit is None else "its format says"
-    chosen, ambiguities = _judge(name, period, numbers, known, by)
-    if time_unit is not None and time_unit == known:
-        chosen, ambiguities = known, ()  # said twice
-    elif time_unit is not None:
-        if known is not None and not ambiguities:
-            raise ConfigurationError(
-                f"{name} is in {known}, but --time-unit says {time_unit}; drop it"
-            )
-        chosen, ambiguities = _judge(name, period, numbers, time_unit, "--time-unit says")
-    elif counts and ambiguities:
-        return Clock(elapsed * SECONDS[chosen], f"{name} in {chosen}", ambiguities)
-    elif known is None and period > 0 and (at := rate or own_rate):
-        # A rate that agrees in one unit settles it.
-        agrees = [u for u, scale in SECONDS.items() if _same(at, 1 / (period * scale))]
-        chosen, ambiguities = (agrees[0], ()) if agrees else (chosen, ambiguities)
-    seconds = period * SECONDS[chosen]
-    if rate is not None and not (period > 0 and _same(rate, 1 / seconds)):
-        found = f"{1 / seconds:.4g} Hz" if period > 0 else "no rate"
+    return _TimeStamps(episode, name, numbers, unit, options, declared).clock()
+
+
+def _clock_at_rate(
+    episode: str, count: int, options: ReadOptions, declared: DeclaredRate | None
+) -> Clock:
+    """Times of frames at the user's rate, else at the declared one."""
+    rate = options.rate
+    if options.time_unit is not None:
         raise ConfigurationError(
-            f"--rate {rate:g}, but {name} in {chosen} says {found}; drop --rate, say the unit with "
-            "--time-unit, or leave the times unread with --time-column none"
+            f"--time-unit {options.time_unit} is of a column of times, and episode {episode} has "
+            "none; drop it, or name the column"
         )
-    if own_rate is not None and rate is None and period > 0 and not _same(own_rate, 1 / seconds):
+    if rate is not None:
+        return Clock(
+            np.arange(count) / rate, f"the given rate{_other_rates(episode, rate, declared)}"
+        )
+    if declared is None:
         raise FileFormatError(
-            f"episode {episode}: {name} says {1 / seconds:.4g} frames a second, but {rate_name} "
-            f"{own_rate:.4g}; take one: --time-column {name}, or --time-column none"
+            f"episode {episode} holds neither times nor a rate; give the rate in frames a "
+            "second: --rate"
         )
-    return Clock(elapsed * SECONDS[chosen], f"{name} in {chosen}", ambiguities)
+    (hertz, name), likely = declared, declared.likely
+    doubts: tuple[Ambiguity, ...] = ()
+    if hertz not in likely:
+        looks = likely or [hertz]
+        what = f"{name} in the file says {hertz:.4g} frames a second, {count / hertz:.4g} s in all"
+        doubts = (Ambiguity(f"{what}: it looks like {either(looks)}", f"--rate {looks[0]:.6g}"),)
+    return Clock(np.arange(count) / hertz, f"{name} in the file", doubts)
+
+
+def _other_rates(episode: str, rate: float, declared: DeclaredRate | None) -> str:
+    """Say which other rates the episode's name and its file say beside the user's.
+
+    ConfigurationError if the file's is plausible.
+    """
+    in_name = _HERTZ.search(episode)
+    stated = float(in_name[1].replace(",", ".")) if in_name else rate
+    said = "" if same_rate(rate, stated) else f" (the name {episode} says {stated:g} Hz)"
+    if declared is None or any(same_rate(rate, each) for each in declared.likely or [rate]):
+        return said
+    if declared.hertz in declared.likely:
+        raise ConfigurationError(
+            f"--rate {rate:g}, but {declared.name} in the file says {declared.hertz:.4g} frames a "
+            "second; drop --rate, or leave the file's rate unread: --time-column none"
+        )
+    return f"{said} ({declared.name} in the file says {either(declared.likely)} Hz)"
+
+
+class _TimeStamps:
+    """Time stamps of an episode's frames, on the way to its times in [s]."""
+
+    def __init__(
+        self,
+        episode: str,
+        name: str,
+        numbers: Times,
+        fixed: str | None,
+        options: ReadOptions,
+        declared: DeclaredRate | None,
+    ) -> None:
+        """Find out what is known of their unit: the format's (`fixed`), or that in their name."""
+        self.episode, self.name, self.fixed = episode, name, fixed
+        self.given, self.rate, self.declared = options.time_unit, options.rate, declared
+        self.any_rate = options.rate or (declared.hertz if declared else None)
+        unit, size = without_number(fixed or split_unit(name, SECONDS)[1] or "")
+        self.numbers = numbers * size  # of `t [0.1 ms]`
+        self.unit: str | None = unit or None
+        silent = not unit and self.given is None
+        self.is_counter = silent and is_counter(name, self.numbers)
+        if self.is_counter and self.any_rate and self._goes_on_by_one():
+            self.unit = FRAME
+        elif silent and are_ticks(self.numbers):
+            self.numbers, self.unit = (self.numbers - self.numbers[0]) * 100, "ns"
+        elif silent:
+            self._refuse_unknown_unit()
+
+    def clock(self) -> Clock:
+        """Return the times, by the unit that is known, agrees with a rate, or is likely."""
+        name, numbers = self.name, self.numbers
+        if FRAME in (self.given, self.unit):
+            return self._clock_of_counter()
+        if not np.all(np.isfinite(numbers)):
+            return Clock(numbers, name)  # the recording names the frame
+        if rises(-numbers):
+            raise InvalidDemonstrationsError(
+                f"episode {self.episode}: {name} falls with every frame, as what counts down does: "
+                "write its negative, or turn frames in reverse round, or give --time-column none "
+                "--rate HZ"
+            )
+        period = float(np.median(np.diff(numbers))) if len(numbers) > 1 else 0.0
+        if abs(period) not in (0.0, np.clip(abs(period), 1e-12, 1e15)):
+            raise FileFormatError(
+                f"episode {self.episode}: {name} steps by {period:g} a frame, which is no time in "
+                "any unit; mend it, or leave the times unread with --time-column none"
+            )
+        unit, ambiguities = self._judged(period)
+        # From the first on, since nanoseconds since 1970 are 0.2 us coarse as floats.
+        elapsed = numbers - (numbers[0] if len(numbers) else 0.0)
+        if not (self.is_counter and ambiguities):
+            self._check_rates(period, unit)
+        return Clock(elapsed * SECONDS[unit], f"{name} in {unit}", ambiguities)
+
+    def _goes_on_by_one(self) -> bool:
+        """Whether a counter goes on by one from frame to frame, but for lost ones."""
+        steps = np.diff(self.numbers)
+        return bool(np.all(steps >= 1) and 2 * np.sum(steps > 1) <= len(steps))
+
+    def _refuse_unknown_unit(self) -> None:
+        unknown = _IN_BRACKETS.search(self.name)
+        if unknown is not None and not _QUALIFIES.fullmatch(unknown[1]):
+            raise FileFormatError(
+                f"episode {self.episode}: {self.name} is in {unknown[1]!r}, which is no known unit "
+                f"of time ({', '.join(SECONDS)}): say it with --time-unit, or convert that column"
+            )
+
+    def _clock_of_counter(self) -> Clock:
+        """Times of frames that are counted, by the rate."""
+        if not self.any_rate or self.given not in (None, FRAME):
+            raise ConfigurationError(
+                f"{self.name} counts frames, so the rate is wanted: add --rate, and no other "
+                "--time-unit"
+            )
+        step = np.diff(self.numbers).min(initial=np.inf) if self.fixed == FRAME else 1.0
+        times = self.numbers / step / self.any_rate
+        return Clock(times, f"{self.name}, frames at {self.any_rate:g} Hz")
+
+    def _judged(self, period: float) -> tuple[str, tuple[Ambiguity, ...]]:
+        """The unit, and what makes it doubtful; `period` is between two frames, in that unit."""
+        by = "its name says" if self.fixed is None else "its format says"
+        unit, doubts = _judge(self.name, period, self.numbers, self.unit, by)
+        if self.given is None:
+            if self.unit or not self.any_rate or period <= 0 or (self.is_counter and doubts):
+                return unit, doubts
+            # A rate that agrees in one unit settles it.
+            rates = {u: 1 / (period * scale) for u, scale in SECONDS.items()}
+            agrees = next((u for u, rate in rates.items() if same_rate(self.any_rate, rate)), None)
+            return (agrees, ()) if agrees else (unit, doubts)
+        if self.given == self.unit:  # said twice
+            return self.given, ()
+        if self.unit is not None and not doubts:
+            raise ConfigurationError(
+                f"{self.name} is in {self.unit}, but --time-unit says {self.given}; drop it"
+            )
+        return _judge(self.name, period, self.numbers, self.given, "--time-unit says")
+
+    def _check_rates(self, period: float, unit: str) -> None:
+        """Refuse time stamps that contradict the user's rate, or the declared one."""
+        name, own = self.name, 1 / (period * SECONDS[unit]) if period > 0 else 0.0
+        if self.rate is not None and not (own and same_rate(self.rate, own)):
+            found = f"{own:.4g} Hz" if own else "no rate"
+            raise ConfigurationError(
+                f"--rate {self.rate:g}, but {name} in {unit} says {found}; drop --rate, say the "
+                "unit with --time-unit, or leave the times unread with --time-column none"
+            )
+        if self.declared and self.rate is None and own and not same_rate(self.declared.hertz, own):
+            raise FileFormatError(
+                f"episode {self.episode}: {name} says {own:.4g} frames a second, but "
+                f"{self.declared.name} {self.declared.hertz:.4g}; take one: --time-column {name}, "
+                "or --time-column none"
+            )
 
 
 def clock_among(
@@ -264,13 +273,13 @@ def clock_among(
     count: int,
     arrays: Mapping[str, np.ndarray],
     options: ReadOptions,
-    said: Mapping[str, Any] | None = None,
+    numbers: Mapping[str, Any] | None = None,
     motion: Collection[str] = (),
 ) -> Clock:
-    """Return times from the arrays of an episode that say they are, held against each other.
+    """Return times from those arrays of an episode that are time stamps, held against each other.
 
-    `said` are further numbers of the file, a rate perhaps among them. An array that is asked for by
-    name counts more. Where none says so, one that is no part of the `motion` may be the time.
+    `numbers` are further ones of the file, a rate perhaps among them. An array that the user names
+    counts more. Where no name says so, one that is no part of the `motion` may be the time.
     """
     asked = options.time_column
     if asked not in (None, NO_COLUMN, *arrays):
@@ -278,30 +287,31 @@ def clock_among(
     every = {name: (name, array) for name, array in arrays.items()}
     called = [name for name in arrays if split_unit(name, SECONDS)[0] in ARRAY_TIMES]
     fit = {n: own for n, own in every.items() if own[1].shape == (count,) and n not in motion}
-    free = fit | {name: every[name] for name in called}
-    found = find_times(where, free, called, no_motion=True)
-    timed = asked not in (None, NO_COLUMN) and found.columns
-    said = {n: _first(v, count) for n, v in (said or {}).items() if not _are_periods(n, v, count)}
-    said = {n: v for n, v in said.items() if np.shape(v) != (count,)}  # a rate of each frame
-    if asked == NO_COLUMN and options.rate is not None:  # what is no number is left unread
-        said = {n: v for n, v in said.items() if np.size(v) == 1}
-    own = {} if timed else declared_rate(where, said, options.rate)
-    if asked is not None and asked in arrays:
-        found = FoundTimes((asked,), summed=_are_periods(asked, arrays[asked], count))
+    found = find_times(where, fit | {n: every[n] for n in called}, called, no_motion=True)
+    unread = options.rate is not None if asked == NO_COLUMN else asked and found.columns
+    declared = None if unread else _rate_among(where, numbers or {}, count, options.rate)
+    if asked in arrays:
+        found = FoundTimes((asked,), summed=_are_periods(str(asked), arrays[str(asked)], count))
     elif asked == NO_COLUMN:
         found = FoundTimes()
     elif not found.columns:
-        rate = options.rate or own.get("own_rate")
+        rate = options.rate or (declared.hertz if declared else None)
         found = other_times(where, fit, rate, in_arrays=True)
-    if not found.columns:
-        return options.clock(episode, count, **own)
-    return clock_at(f"{where}: {episode}", episode, count, found, every, options, **own)
+    return clock_at(f"{where}: {episode}", episode, count, found, every, options, declared)
 
 
-def _first(values: Any, count: int) -> Any:
-    """The one number of values that are the same in each frame; others as they are."""
-    same = np.shape(values) == (count,) and np.all(np.equal(values, values[0]))
-    return values[0] if same else values
+def _rate_among(
+    where: Path, numbers: Mapping[str, Any], count: int, given: float | None
+) -> DeclaredRate | None:
+    """The declared rate, which may stand in every frame; a rate of each frame is none."""
+    found = {}
+    for name, value in numbers.items():
+        of_frames = np.shape(value) == (count,)
+        if not of_frames:
+            found[name] = value
+        elif not _are_periods(name, value, count) and np.all(np.equal(value, value[0])):
+            found[name] = value[0]
+    return declared_rate(where, found, given)
 
 
 def _are_periods(name: str, values: Any, count: int) -> bool:
@@ -317,14 +327,17 @@ def clock_at(
     found: FoundTimes,
     columns: Columns,
     options: ReadOptions,
-    **of_file: Any,
+    declared: DeclaredRate | None,
 ) -> Clock:
-    """Return the times of the found column, held against others; `of_file` is as in `clock_of`."""
+    """Return the times of the found columns, held against others; by a rate if none is found."""
+    if not found.columns:
+        return clock_of(episode, count, options, declared=declared)
     name, stamps = columns[found.columns[0]]
     if found.summed:
         stamps = np.concatenate([[0.0], np.cumsum(stamps[1:])])
-    of_file["unit"] = found.unit or of_file.get("unit")
-    clock = options.clock(episode, count, stamps=stamps, name=name, **of_file)
+    clock = clock_of(
+        episode, count, options, stamps=stamps, name=name, unit=found.unit, declared=declared
+    )
     held = {columns[i][0]: columns[i][1] for i in found.held if columns[i][1].shape == (count,)}
     if count > 1:
         hold_together(where, {name: clock.times, **held})
@@ -343,7 +356,9 @@ def hold_together(where: str, clocks: Mapping[str, Times]) -> None:
         stamps = stamps.astype(float)
         steps = np.diff(stamps)
         own = float(np.median(steps))
-        scales = [scale for scale in SECONDS.values() if period > 0 and _same(own * scale, period)]
+        scales = [
+            scale for scale in SECONDS.values() if period > 0 and same_rate(own * scale, period)
+        ]
         if not scales and skips_frames(stamps):
             scales = [period / own]
         if own <= 0 or (not scales and np.all(steps == 1)):
@@ -365,28 +380,6 @@ def hold_together(where: str, clocks: Mapping[str, Times]) -> None:
                 f"{where}: {name} and {other} part by {apart.max():.3g} s, most at frame {frame}; "
                 f"say which is the time: --time-column {name}, or {other}"
             )
-
-
-def _likely_rates(name: str, rate: float) -> list[float]:
-    """What a declared rate may be: `dt` 20, at which no arm is recorded, is in ms, or a rate."""
-    in_units = [rate / scale for unit, scale in SECONDS.items() if unit not in ("min", "h")]
-    others = [1 / rate, *in_units] if _RATE.fullmatch(name.lower()) else [*in_units, 1 / rate]
-    return [rate] if is_frame_rate(rate) else list(filter(is_frame_rate, others))
-
-
-def _doubt_rate(
-    name: str, rate: float, likely: Sequence[float], count: int
-) -> tuple[Ambiguity, ...]:
-    """Doubt a declared rate at which no arm is recorded, for those that it may be."""
-    if rate in likely:
-        return ()
-    likely = likely or [rate]
-    what = f"{name} in the file says {rate:.4g} frames a second, {count / rate:.4g} s in all"
-    return (Ambiguity(f"{what}: it looks like {_or(likely)}", f"--rate {likely[0]:.6g}"),)
-
-
-def _or(rates: Sequence[float]) -> str:
-    return " or ".join(f"{rate:.4g}" for rate in rates)
 
 
 def _judge(
@@ -421,24 +414,23 @@ def _judge(
     if said is None and period != 1 and too_short:
         what += f", which no throw is; it looks like key frames in {unit}"
         return unit, (Ambiguity(what, f"--time-unit {unit}"),)
-    what += f": it looks like {looks}"
-    if said is None and "tick" in name.lower() and period != 1 and is_frame_rate(1e7 / period):
+    doubt = Ambiguity(f"{what}: it looks like {looks}", f"--time-unit {looks}")
+    if said is not None:
+        return looks, (doubt,)
+    if "tick" in name.lower() and period != 1 and is_frame_rate(1e7 / period):
         what = f"{name} steps by {period:g}, and nothing says how long a tick is"
         what += " (.NET's are 100 ns: then write that column in ns, times 100)"
         return "s", (Ambiguity(what, "--time-unit UNIT", guessed=False),)
     counts, is_time = is_counter(name, numbers), says_time(name) or name.lower() in SECONDS
     brief = numbers[0] in (0, 1) and length * SECONDS[looks] < _BRIEF
-    if said is None and (counts or (period == 1 and (brief or not is_time))):
+    if counts or (period == 1 and (brief or not is_time)):
         steps = f", {period:g} at a time" if period != 1 else ""
         what = f"{name} counts frames{steps}, and nothing says how many a second are"
         if period != 1 or not counts:
             what += f" (or it is a time: --time-unit {looks}"
             what += "; or say it of the rows: --time-column none --rate HZ)" if counts else ")"
         return "s", (Ambiguity(what, "--time-unit frame --rate HZ", guessed=False),)
-    if said is None and period == 1:
-        what += " (or it counts frames: --time-unit frame --rate HZ)"
-    return looks, (Ambiguity(what, f"--time-unit {looks}"),)
-
-
-def _same(one: float, two: float) -> bool:
-    return abs(one - two) <= SAME_RATE * two
+    if period == 1:
+        also = f"{doubt.what} (or it counts frames: --time-unit frame --rate HZ)"
+        doubt = replace(doubt, what=also)
+    return looks, (doubt,)

@@ -17,9 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from prior_reinforce.arm.recordings.beside import columns_beside, twin_vectors
-from prior_reinforce.arm.recordings.clock import NO_COLUMN
 from prior_reinforce.arm.recordings.naming import find_channels, numbered_like, vectors, words
-from prior_reinforce.arm.recordings.options import ReadOptions
+from prior_reinforce.arm.recordings.options import NO_COLUMN, ReadOptions
 from prior_reinforce.arm.recordings.outcome_names import names_in
 from prior_reinforce.arm.recordings.outcomes import key_column
 from prior_reinforce.arm.recordings.recording import (

@@ -22,12 +22,13 @@ from jaxtyping import Shaped
 
 from prior_reinforce.arm.recordings.beside import may_move
 from prior_reinforce.arm.recordings.bounds import check_bytes, check_numbers
-from prior_reinforce.arm.recordings.clock import NO_COLUMN, Clock, clock_among, hold_together
+from prior_reinforce.arm.recordings.clock import clock_among, clock_of, hold_together
 from prior_reinforce.arm.recordings.naming import missing_channels, said_in
-from prior_reinforce.arm.recordings.options import ReadOptions
+from prior_reinforce.arm.recordings.options import NO_COLUMN, ReadOptions
+from prior_reinforce.arm.recordings.rates import DeclaredRate
 from prior_reinforce.arm.recordings.recording import Episodes, Positions, Recording, named_damage
 from prior_reinforce.arm.recordings.stated import recorded_among, says_success
-from prior_reinforce.arm.recordings.time_finder import Times, says_time, tells_time
+from prior_reinforce.arm.recordings.time_finder import Clock, Times, says_time, tells_time
 from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.plans.channels import Kind, kinds, says_no_position
@@ -150,7 +151,7 @@ def _clock(
     late = np.abs(stamps - stamps[0] - (index - index[0]) / rate).max() > _LATE / rate
     if asked or (late and options.time_column is None):
         return clock_among(source, episode, len(index), clocks, options, {"fps": rate})
-    clock = options.clock(episode, len(index), rate_name="fps", own_rate=rate)
+    clock = clock_of(episode, len(index), options, declared=DeclaredRate(rate, "fps"))
     clock = replace(clock, times=index * clock.period)
     others = {n: a for n, a in clocks.items() if n != _STAMPS and tells_time(n, a)}
     if options.time_column is None and others:

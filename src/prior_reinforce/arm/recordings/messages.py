@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from prior_reinforce.arm.recordings.bounds import check_names
+from prior_reinforce.arm.recordings.clock import clock_of
 from prior_reinforce.arm.recordings.naming import find_channels, missing_channels
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import Beside, Positions, Recording, recorded
@@ -101,7 +102,7 @@ def read_messages(
         remarks.append(f"{skipped} messages without all joints skipped")
     # Since the first stamp; since 1970, nanoseconds would be 256 ns coarse as floats.
     stamps = np.array([m.at(clock) - kept[0].at(clock) for m in kept], dtype=np.float64)[inside]
-    frames = options.clock(name, len(stamps), stamps=stamps, name=_CLOCKS[clock], unit="ns")
+    frames = clock_of(name, len(stamps), options, stamps=stamps, name=_CLOCKS[clock], unit="ns")
     positions = np.column_stack([_positions(kept, names), *joined.values()])[inside]
     remarks += [*notes, *said]
     names += tuple(joined)

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import tyro
 
-from prior_reinforce.arm.recordings.clock import NO_COLUMN, TIME_UNITS, Clock, clock_of
-from prior_reinforce.arm.recordings.tables import DELIMITERS
+from prior_reinforce.arm.recordings.units import TIME_UNITS
 from prior_reinforce.errors import ConfigurationError
+
+NO_COLUMN = "none"
+"""Value of `time_column` and of `episode_column` by which no such column is read."""
+DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": r"\s+"}
+"""How the command line names what stands between two cells."""
 
 
 @dataclass(frozen=True)
@@ -90,9 +94,3 @@ class ReadOptions:
         """Whether an episode was not asked for."""
         wanted = self.episodes is None or episode in self.episodes
         return not wanted or episode in (self.leave_out or ())
-
-    def clock(self, episode: str, count: int, **of_file: Any) -> Clock:
-        """Return an episode's times from these options and what the file says (`clock_of`)."""
-        if self.time_column == NO_COLUMN and self.rate is not None:
-            of_file.pop("own_rate", None)
-        return clock_of(episode, count, rate=self.rate, time_unit=self.time_unit, **of_file)

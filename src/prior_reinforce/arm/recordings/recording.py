@@ -15,8 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.arm.recordings.bounds import check_names
-from prior_reinforce.arm.recordings.clock import Clock
-from prior_reinforce.arm.recordings.time_finder import Times, is_set_back
+from prior_reinforce.arm.recordings.time_finder import Clock, Times, is_set_back
 from prior_reinforce.arm.recordings.units import (
     CHANNEL_UNITS,
     Ambiguity,

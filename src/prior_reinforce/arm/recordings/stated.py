@@ -11,18 +11,19 @@ import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from operator import getitem
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from prior_reinforce.arm.recordings.beside import MASK, Arrays, arrays_beside, follows, may_move
-from prior_reinforce.arm.recordings.clock import Clock, clock_among
+from prior_reinforce.arm.recordings.clock import clock_among
 from prior_reinforce.arm.recordings.naming import (
     OTHER_NAMES,
     Texts,
     find_channels,
     missing_channels,
 )
+from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     MOST_LOST,
     Positions,
@@ -31,7 +32,7 @@ from prior_reinforce.arm.recordings.recording import (
     refuse_exchanged,
     without_units,
 )
-from prior_reinforce.arm.recordings.time_finder import says_time
+from prior_reinforce.arm.recordings.time_finder import Clock, says_time
 from prior_reinforce.arm.recordings.units import (
     CHANNEL_UNITS,
     Ambiguity,
@@ -47,9 +48,6 @@ from prior_reinforce.plans.channels import (
     one_for_all,
     says_no_position,
 )
-
-if TYPE_CHECKING:
-    from prior_reinforce.arm.recordings.options import ReadOptions
 
 _NAMES = re.compile(r"name|joint|dof|motor|actuator|channel|column|label|ax[ei]s", re.IGNORECASE)
 _FRAMES = re.compile(

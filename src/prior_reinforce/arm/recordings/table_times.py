@@ -6,22 +6,17 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import product
-from typing import Any
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.clock import (
-    NO_COLUMN,
-    Clock,
-    clock_at,
-    declared_rate,
-)
-from prior_reinforce.arm.recordings.options import ReadOptions
+from prior_reinforce.arm.recordings.clock import clock_at, clock_of
+from prior_reinforce.arm.recordings.options import NO_COLUMN, ReadOptions
+from prior_reinforce.arm.recordings.rates import DeclaredRate, declared_rate
 from prior_reinforce.arm.recordings.tables import Column, Table
 from prior_reinforce.arm.recordings.time_finder import (
     COLUMN_TIMES,
     FEWEST_COUNTS,
-    FRAME,
+    Clock,
     FoundTimes,
     Times,
     find_times,
@@ -31,7 +26,7 @@ from prior_reinforce.arm.recordings.time_finder import (
     rises,
     says_time,
 )
-from prior_reinforce.arm.recordings.units import SECONDS, known_unit, say_names, split_unit
+from prior_reinforce.arm.recordings.units import FRAME, SECONDS, known_unit, say_names, split_unit
 from prior_reinforce.errors import ConfigurationError
 from prior_reinforce.units import NS_PER_S
 
@@ -47,8 +42,8 @@ _THOUSAND = re.compile(r"\d{1,3}([.,]\d{3})+")
 """`1.000` beside a decimal comma."""
 
 
-def _declared(table: Table, options: ReadOptions) -> dict[str, Any]:
-    """The rate that comments or a column of one number declare, for `clock_of`."""
+def _declared(table: Table, options: ReadOptions) -> DeclaredRate | None:
+    """The frame rate that comments or a column of one number declare."""
     said = {
         name: float(own[0])
         for name, own in zip(table.names, table.values.T, strict=True)
@@ -116,7 +111,8 @@ def time_columns(table: Table, options: ReadOptions, others: Sequence[int | None
     found = find_times(table.where, free, called, no_motion=len(others) > 1)
     if found.columns:
         return found
-    rate = options.rate or _declared(table, options).get("own_rate")
+    declared = _declared(table, options)
+    rate = options.rate or (declared.hertz if declared else None)
     found = other_times(table.where, free, rate, in_arrays=False)
     return found if len(table.names) > 1 else FoundTimes()
 
@@ -181,7 +177,7 @@ def clock_of_table(
         declared = _declared(table, options)
         if not (declared or options.rate):  # a line of means is no want of times
             _check_times(table, [i for i, n in enumerate(table.names) if says_time(n)])
-        return options.clock(episode, len(table), **declared)
+        return clock_of(episode, len(table), options, declared=declared)
     time = times.columns[0]
     columns = _columns(table, range(len(table.names)))
     if table.nanoseconds(time) is not None:
@@ -197,9 +193,9 @@ def clock_of_table(
         columns[time] = (f"{name} and {part_name}", stamps)
     # Where there are times, a comment may be of another rate, as that of control.
     frames = FRAME in (unit, options.time_unit)
-    declared = _declared(table, options) if frames else {}
+    declared = _declared(table, options) if frames else None
     times = times._replace(held=tuple(i for i in times.held if table.is_number(i)), unit=unit)
-    return clock_at(table.where, episode, len(table), times, columns, options, **declared)
+    return clock_at(table.where, episode, len(table), times, columns, options, declared)
 
 
 def _check_times(table: Table, columns: Sequence[int]) -> None:

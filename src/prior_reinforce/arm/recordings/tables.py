@@ -22,6 +22,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from prior_reinforce.arm.recordings.bounds import check_bytes, check_names, check_rows, check_table
+from prior_reinforce.arm.recordings.options import DELIMITERS
 from prior_reinforce.arm.recordings.recording import named_damage
 from prior_reinforce.arm.recordings.units import known_unit, split_unit
 from prior_reinforce.errors import FileFormatError
@@ -31,8 +32,6 @@ _Column = tuple[str, str | None, list[str]]
 """Name, unit and cells of a column."""
 Column = Float[np.ndarray, " T"]
 """Numbers of T rows."""
-DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": r"\s+"}
-"""How the command line names what stands between two cells."""
 _COMMENTS = ("#", "%", "//")
 _SAMPLE = 40
 """Lines from which a dialect is inferred."""

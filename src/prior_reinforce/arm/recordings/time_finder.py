@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import re
 import shlex
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Shaped
 
-from prior_reinforce.arm.recordings.units import SECONDS, Ambiguity, split_unit
+from prior_reinforce.arm.recordings.units import FRAME, SECONDS, Ambiguity, split_unit
 from prior_reinforce.errors import FileFormatError
 
 Times = Float[np.ndarray, " T"]
@@ -20,8 +22,6 @@ Stamps = Shaped[np.ndarray, "..."]
 """Times of T frames as a file holds them: in its unit, of any shape and kind."""
 Columns = Mapping[Any, tuple[str, Stamps]]
 """Name and numbers of columns by their place in a table, or of arrays by their name."""
-FRAME = "frame"
-"""The unit of a column that counts frames; the rate says how long one is."""
 FEWEST_COUNTS = 20
 """Frames of which it can be said that something counts them. Ours."""
 COUNTER = re.compile(
@@ -72,6 +72,23 @@ _FEW_COUNTS = 100
 """Whole numbers with smaller steps count anything, cycles of a servo for instance. Ours."""
 _SAME_CLOCK = 0.01
 """Share by which two clocks of a recording differ at most. Ours."""
+
+
+@dataclass(frozen=True, eq=False)
+class Clock:
+    """Times of an episode's frames, and their source."""
+
+    times: Times
+    """From any origin."""
+    source: str
+    """For a person: `t in ms`, `the given rate`."""
+    ambiguities: tuple[Ambiguity, ...] = ()
+    """What is only inferred of them."""
+
+    @property
+    def period(self) -> float:
+        """Median time between two frames, in [s]; nan where there is one frame."""
+        return float(np.median(np.diff(self.times))) if len(self.times) > 1 else math.nan
 
 
 class FoundTimes(NamedTuple):

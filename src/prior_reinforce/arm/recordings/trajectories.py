@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from prior_reinforce.arm.recordings.bounds import check_numbers
+from prior_reinforce.arm.recordings.clock import clock_of
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import Recording, recorded
 
@@ -44,5 +45,5 @@ def read_trajectory(path: Path, episode: str, message: Any, options: ReadOptions
         remarks.append(f"{len(times)} via points joined by {degree}, as a controller joins them")
         times = np.linspace(times[0], times[-1], frames)
         positions = curve(times)
-    clock = options.clock(episode, len(times), stamps=times, name="time_from_start", unit="s")
+    clock = clock_of(episode, len(times), options, stamps=times, name="time_from_start", unit="s")
     return recorded(episode, clock, positions, joints, remarks=remarks)

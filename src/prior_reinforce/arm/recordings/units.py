@@ -25,6 +25,9 @@ from prior_reinforce.wording import listed
 
 SECONDS = units_of("time")
 """Units of time, in [s]."""
+FRAME = "frame"
+"""Unit of a column that counts frames; the rate says how long one is."""
+TIME_UNITS = (*SECONDS, FRAME)
 CHANNEL_UNITS = (*units_of("angle"), *units_of("length"), "percent")
 """Units that a channel's name may carry."""
 _UNITS = (*CHANNEL_UNITS, *SECONDS)
