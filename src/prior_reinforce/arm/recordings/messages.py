@@ -1,13 +1,14 @@
-"""One episode from the messages of a bag: whose they are, when they were sent, and which joints.
+"""One episode from the messages of a bag: their publisher, their clock, and their joints.
 
-Each joint is a series of its own, because joints may come in several messages or topics, in any
-order.
+Joints may come in several messages or topics, in any order, so each is a series of its own.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -32,16 +33,16 @@ _LATE = 2e8
 """By how much longer a joint's messages may be on their way than others, in [ns]. Ours: more than
 queues hold them, less than clocks nobody synchronised mostly differ by."""
 _MOVES, _LEAP, _OFTEN = 0.02, 0.5, 0.05
-"""Range in [rad] or [m] that is a motion; part of it that is a leap; share of frames in which no
-joint leaps, but two publishers do in turn. Ours."""
+"""Range in [rad] or [m] of a motion; part of it that is a leap; share of frames with leaps beyond
+which two publishers are mixed. Ours."""
 _ONCE = 2
 """Leaps there and back that a gripper told seldom may make, as it closes and opens. Ours."""
 _HELD = 1e-3
 """Range in [rad] or [m] of a joint that is held, so that no rate tells more of it. Ours."""
 _ON_ITS_WAY, _SELDOM, _LOST = 0.05, 0.25, 2.5
-"""Part of its greatest speed at which a motion is on its way; part of its range that its fastest
-joint may go between two messages of another joint, an eighth of a smooth motion, where a straight
-line errs by 1 %; frames that may always lie between them. Ours."""
+"""Part of its greatest speed above which a motion is under way; part of its range that it may go
+between two messages of another joint, where a straight line errs by 1 %; frames that may always lie
+between these. Ours."""
 
 
 class Message(NamedTuple):
@@ -72,174 +73,175 @@ class Message(NamedTuple):
 
 
 def read_messages(
-    bag: Path,
+    path: Path,
     name: str,
     topics: Sequence[list[Message]],
     options: ReadOptions,
     notes: Sequence[str],
     elsewhere: Mapping[str, Beside],
 ) -> Recording:
-    """Return one episode, whose frames are the messages that tell the most of the wanted joints.
+    """Return one episode, whose frames are the messages that hold most of the wanted joints.
 
     Other joints are interpolated at their times, each from the first topic that names it; frames
-    before or after such a joint is told are left out. One that holds a value all along is taken to
-    hold it in every frame; FileFormatError if one that moves is told too seldom.
+    before the first or after the last message of such a joint are left out. A joint that keeps one
+    value is taken to keep it in every frame; FileFormatError if one that moves comes too seldom.
     """
-    owner: dict[str, int] = {}
-    for topic, of_topic in enumerate(topics):
-        for joint in (joint for m in of_topic for joint in m.content.name):
-            owner.setdefault(joint, topic)
-    wanted = _wanted(bag, topics, owner, options.joints, notes)
-    most, messages = _most_telling(topics, owner, wanted)
-    kept, remarks = _of_one_publisher(bag, messages, most)
-    kept, clock, said = _by_clock(bag, kept, most, options.time_column)
+    bag = _Bag(path, topics, options, notes)
+    most, messages = bag.frames()
+    kept, remarks = _of_one_publisher(path, messages, most)
+    kept, clock, of_clock = _by_clock(path, kept, most, options.time_column)
     # Other channels of these messages, such as fingers, stay available by name.
     names = tuple(n for n in kept[0].content.name if all(n in m.content.name for m in kept))
-    beside = _series_beside(bag, topics, owner, names, wanted, remarks)
-    joined, inside, of_joints = _joined(bag, kept, most, clock, beside, wanted, options)
-    remarks += of_joints
-    if (skipped := len(topics[owner[most[0]]]) - len(kept)) and {*joined}.isdisjoint(wanted):
+    beside, of_others = bag.others(names)
+    joined, inside, of_joints = bag.joined(kept, most, clock, beside)
+    remarks += [*of_others, *of_joints]
+    skipped = len(topics[bag.topic_of[most[0]]]) - len(kept)
+    if skipped and {*joined}.isdisjoint(bag.wanted):
         remarks.append(f"{skipped} messages without all joints skipped")
     # Since the first stamp; since 1970, nanoseconds would be 256 ns coarse as floats.
     stamps = np.array([m.at(clock) - kept[0].at(clock) for m in kept], dtype=np.float64)[inside]
-    frames = clock_of(name, len(stamps), options, stamps=stamps, name=_CLOCKS[clock], unit="ns")
+    times = clock_of(name, len(stamps), options, stamps=stamps, name=_CLOCKS[clock], unit="ns")
     positions = np.column_stack([_positions(kept, names), *joined.values()])[inside]
-    remarks += [*notes, *said]
+    remarks += [*notes, *of_clock]
     names += tuple(joined)
-    return recorded(name, frames, positions, names, remarks=tuple(remarks), beside=elsewhere)
+    return recorded(name, times, positions, names, remarks=tuple(remarks), beside=elsewhere)
 
 
-def _most_telling(
-    topics: Sequence[list[Message]], owner: Mapping[str, int], wanted: Sequence[str]
-) -> tuple[tuple[str, ...], list[Message]]:
-    """The wanted joints of which messages tell most, and these messages; none where none do."""
-    told: dict[tuple[str, ...], list[Message]] = {(): []}
-    for topic, messages in enumerate(topics):
-        for m in messages:
-            own = tuple(j for j in wanted if owner[j] == topic and j in m.content.name)
-            if own and len(m.content.position):
-                told.setdefault(own, []).append(m)
-    return max(told.items(), key=lambda item: len(item[0]) * len(item[1]))
+@dataclass(frozen=True, eq=False)
+class _Bag:
+    """Messages of joints, topic by topic; each joint counts in the first topic that names it."""
 
+    path: Path
+    topics: Sequence[list[Message]]
+    options: ReadOptions
+    notes: Sequence[str]
+    """What is said of the bag's other topics."""
 
-def _joined(
-    bag: Path,
-    kept: list[Message],
-    most: Sequence[str],
-    clock: str,
-    beside: Sequence[tuple[str, list[Message]]],
-    wanted: Sequence[str],
-    options: ReadOptions,
-) -> tuple[dict[str, Times], np.ndarray, list[str]]:
-    """Joints that other messages tell, at the times of those that are kept.
+    @cached_property
+    def topic_of(self) -> dict[str, int]:
+        """Index of the topic that tells each joint."""
+        found: dict[str, int] = {}
+        for topic, messages in enumerate(self.topics):
+            for joint in (joint for m in messages for joint in m.content.name):
+                found.setdefault(joint, topic)
+        return found
 
-    Returns which of these all wanted ones span, and remarks. FileFormatError if a wanted one is
-    told too seldom for the motion; others are left out then.
-    """
-    found: dict[str, Times] = {}
-    by_clock: dict[str, list[str]] = {}
-    held: list[str] = []
-    seldom: list[str] = []
-    inside, motion = np.ones(len(kept), dtype=bool), _positions(kept, most)
-    for joint, series in beside:
-        by = clock if all(m.sent > 0 for m in series) else _RECORDER
-        times, at, values = _series(kept, series, joint, by)
-        if len(values) and np.ptp(values) <= _HELD:  # no rate tells more of it
-            often = "once" if len(values) == 1 else f"{len(values)} times"
-            last = f"last at {at[-1]:.3g} s"
-            held += [f"{joint} told {often}, {last}, held at {values[0]:.3g}"] * (joint in wanted)
-        else:
-            if joint in wanted and series and by == _HEADER != options.time_column:
-                _refuse_late(bag, joint, series, kept)
+    @cached_property
+    def wanted(self) -> tuple[str, ...]:
+        """Recorded names of the joints to read.
+
+        If the user names none: those that most messages of the first topic hold, and all of others.
+        """
+        every, joints = list(self.topic_of), self.options.joints
+        check_names(self.path, every)
+        if not any(every):
+            raise FileFormatError(
+                f"{self.path}: its messages name no joint, so nothing says which number is which; "
+                "record again with names (the driver's or the bridge's setting), or write the "
+                "positions as CSV"
+            )
+        if joints is None:
+            held = Counter(tuple(sorted(m.content.name)) for m in self.topics[0])
+            return (*held.most_common(1)[0][0], *(j for j in every if self.topic_of[j] > 0))
+        found = find_channels(joints, every)
+        if found is None:
+            missing = say_names(missing_channels(joints, every))
+            raise FileFormatError(
+                f"{self.path}: no message holds {missing}; joints in it are {say_names(every)}: "
+                f"name those with --joints{''.join(f'; {note}' for note in self.notes)}"
+            )
+        return tuple(every[i] for i in found)
+
+    def frames(self) -> tuple[tuple[str, ...], list[Message]]:
+        """Return the wanted joints that messages hold together most often, and these messages."""
+        holding: dict[tuple[str, ...], list[Message]] = {(): []}
+        for topic, messages in enumerate(self.topics):
+            for m in messages:
+                own = (j for j in self.wanted if self.topic_of[j] == topic and j in m.content.name)
+                if (joints := tuple(own)) and len(m.content.position):
+                    holding.setdefault(joints, []).append(m)
+        return max(holding.items(), key=lambda item: len(item[0]) * len(item[1]))
+
+    def others(self, names: Sequence[str]) -> tuple[list[tuple[str, list[Message]]], list[str]]:
+        """Return each joint beside `names` with its only publisher's messages, and remarks.
+
+        FileFormatError if publishers of a wanted joint disagree; other joints are left out then.
+        """
+        together: dict[tuple[int, ...], list[str]] = {}  # joints by topic and index of its messages
+        for joint in (joint for joint in self.topic_of if joint not in names):
+            messages = enumerate(self.topics[self.topic_of[joint]])
+            held_by = (
+                i for i, m in messages if joint in m.content.name and len(m.content.position)
+            )
+            together.setdefault((self.topic_of[joint], *held_by), []).append(joint)
+        each, remarks = list[tuple[str, list[Message]]](), list[str]()
+        for (topic, *indices), joints in together.items():
+            series = [self.topics[topic][i] for i in indices]
+            asked = [joint for joint in joints if joint in self.wanted]
+            if series:
+                try:
+                    series, said = _of_one_publisher(self.path, series, asked or joints)
+                except FileFormatError:
+                    if asked:
+                        raise
+                    remarks.append(f"not read: {say_names(joints)}, of publishers that disagree")
+                    continue
+                remarks += said
+            each += [(joint, series) for joint in joints]
+        return each, remarks
+
+    def joined(
+        self,
+        kept: list[Message],
+        most: Sequence[str],
+        clock: str,
+        beside: Sequence[tuple[str, list[Message]]],
+    ) -> tuple[dict[str, Times], np.ndarray, list[str]]:
+        """Return joints of other messages at the times of those that are kept, and remarks.
+
+        Also which of these times lie within all wanted joints' messages. FileFormatError if a
+        wanted joint comes too seldom for the motion; others are left out then.
+        """
+        found: dict[str, Times] = {}
+        by_clock: dict[str, list[str]] = {}
+        held: list[str] = []
+        seldom: list[str] = []
+        inside, motion = np.ones(len(kept), dtype=bool), _positions(kept, most)
+        for joint, series in beside:
+            is_wanted = joint in self.wanted
+            by = clock if all(m.sent > 0 for m in series) else _RECORDER
+            times, at, values = _series(kept, series, joint, by)
+            if len(values) and np.ptp(values) <= _HELD:  # no rate tells more of it
+                often = "once" if len(values) == 1 else f"{len(values)} times"
+                last = f"last at {at[-1]:.3g} s"
+                held += [f"{joint} told {often}, {last}, held at {values[0]:.3g}"] * is_wanted
+                found[joint] = np.interp(times, at, values)
+                continue
+            if is_wanted and series and by == _HEADER != self.options.time_column:
+                _refuse_late(self.path, joint, series, kept)
             gap, longest = _gap(at, times, motion)
-            if gap > longest and joint not in wanted:
+            if gap > longest and not is_wanted:
                 seldom.append(joint)
                 continue
             if gap > longest:
                 raise FileFormatError(
-                    f"{bag}: nothing tells {joint} for {gap:.3g} s of a motion that is too fast "
-                    f"for more than {longest:.3g} s of it; record {joint} more often, or leave it "
-                    "out of --joints"
+                    f"{self.path}: nothing tells {joint} for {gap:.3g} s of a motion that is too "
+                    f"fast for more than {longest:.3g} s of it; record {joint} more often, or "
+                    "leave it out of --joints"
                 )
-            if joint in wanted:
+            if is_wanted:
                 inside &= (times >= at[0]) & (times <= at[-1])
                 by_clock.setdefault(by, []).append(joint)
-        found[joint] = np.interp(times, at, values)
-    outside = f"; {np.sum(~inside)} frames that not all span left out" * (not all(inside))
-    at_times = f"at the times of {say_names(most)}{outside}"
-    remarks = [
-        f"{say_names(those)} interpolated by {_CLOCKS[by]} {at_times}"
-        for by, those in by_clock.items()
-    ]
-    if seldom and options.key:
-        held.append(f"not read: {say_names(seldom)}, told too seldom for the motion")
-    return found, inside, remarks + held
-
-
-def _wanted(
-    bag: Path,
-    topics: Sequence[list[Message]],
-    owner: Mapping[str, int],
-    joints: Sequence[str] | None,
-    notes: Sequence[str],
-) -> tuple[str, ...]:
-    """Recorded names of the joints to read.
-
-    Without `joints` they are those that most messages of the first topic hold, and all of others.
-    """
-    every = list(owner)
-    check_names(bag, every)
-    if not any(every):
-        raise FileFormatError(
-            f"{bag}: its messages name no joint, so nothing says which number is which; record "
-            "again with names (the driver's or the bridge's setting), or write the positions as CSV"
-        )
-    if joints is None:
-        common = Counter(tuple(sorted(m.content.name)) for m in topics[0]).most_common(1)[0][0]
-        return (*common, *(joint for joint in every if owner[joint] > 0))
-    found = find_channels(joints, every)
-    if found is None:
-        missing = say_names(missing_channels(joints, every))
-        raise FileFormatError(
-            f"{bag}: no message holds {missing}; joints in it are {say_names(every)}: name those "
-            f"with --joints{''.join(f'; {note}' for note in notes)}"
-        )
-    return tuple(every[i] for i in found)
-
-
-def _series_beside(
-    bag: Path,
-    topics: Sequence[list[Message]],
-    owner: Mapping[str, int],
-    names: Sequence[str],
-    wanted: Sequence[str],
-    remarks: list[str],
-) -> list[tuple[str, list[Message]]]:
-    """Every joint beside `names` with the messages of its only publisher that tell it.
-
-    What is said of other publishers is added to the remarks. FileFormatError if those of a wanted
-    joint disagree; others are left out then.
-    """
-    together: dict[tuple[int, ...], list[str]] = {}  # joints by topic and index of its messages
-    for joint in (joint for joint in owner if joint not in names):
-        messages = enumerate(topics[owner[joint]])
-        told_by = (i for i, m in messages if joint in m.content.name and len(m.content.position))
-        together.setdefault((owner[joint], *told_by), []).append(joint)
-    each = []
-    for (topic, *which), joints in together.items():
-        series = [topics[topic][i] for i in which]
-        asked = [joint for joint in joints if joint in wanted]
-        if series:
-            try:
-                series, said = _of_one_publisher(bag, series, asked or joints)
-            except FileFormatError:
-                if asked:
-                    raise
-                remarks.append(f"not read: {say_names(joints)}, of publishers that disagree")
-                continue
-            remarks += said
-        each += [(joint, series) for joint in joints]
-    return each
+            found[joint] = np.interp(times, at, values)
+        outside = f"; {np.sum(~inside)} frames that not all span left out" * (not all(inside))
+        at_times = f"at the times of {say_names(most)}{outside}"
+        remarks = [
+            f"{say_names(joints)} interpolated by {_CLOCKS[by]} {at_times}"
+            for by, joints in by_clock.items()
+        ]
+        if seldom and self.options.key:
+            held.append(f"not read: {say_names(seldom)}, told too seldom for the motion")
+        return found, inside, remarks + held
 
 
 def _series(
@@ -282,10 +284,10 @@ def _refuse_late(bag: Path, joint: str, messages: list[Message], frames: list[Me
 def _of_one_publisher(
     bag: Path, messages: list[Message], wanted: Sequence[str]
 ) -> tuple[list[Message], list[str]]:
-    """The messages of the only publisher whose joints move, and what is said of others.
+    """Return the messages of the only publisher whose joints move, and a remark on others.
 
-    Publishers of one topic are told apart by connection (ROS 1), frame, and which joints they name.
-    FileFormatError if none has positions, or several move.
+    Publishers differ in connection (ROS 1), frame, or the joints they name. FileFormatError if none
+    has positions, or several move.
     """
     if not messages:
         raise FileFormatError(
@@ -336,11 +338,10 @@ def _leaps(messages: list[Message], joints: Sequence[str]) -> bool:
 def _by_clock(
     bag: Path, messages: list[Message], joints: Sequence[str], asked: str | None
 ) -> tuple[list[Message], str, list[str]]:
-    """The messages in order of a clock, which clock, and what is said of it.
+    """Return the messages in the order of a clock, that clock, and remarks.
 
-    It is the header's, unless that is unusable or jumps. The recorder's clock holds messages in a
-    queue, and so is late and uneven; but where the header's jumps and the recorder's does not, the
-    header's was set meanwhile.
+    It is the header's, unless that is unusable, or jumps where the recorder's does not. The
+    recorder's is uneven, since messages wait in a queue.
     """
     if asked not in (None, *_CLOCKS):
         raise ConfigurationError(
