@@ -1,4 +1,4 @@
-"""Demonstrations and more of them, which were recorded later."""
+"""Demonstrations recorded later: in the units of the first, and none of them again."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from prior_reinforce.arm.recordings.preprocessing import copies
 from prior_reinforce.arm.recordings.selection import Selection
 from prior_reinforce.arm.recordings.takes import APART, so_far
+from prior_reinforce.arrays import Plans
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.motions import Demonstrations
 from prior_reinforce.plans.speeds import largest_of_unit
@@ -24,8 +24,8 @@ _FITS = 0.3
 """Share of the largest number by which starts and ends may differ once brought to one unit. Ours:
 demonstrations of one task start alike, and end about as far."""
 _LEAST: Mapping[str, float] = {"rad": 1.0, "m": 0.5}
-"""Of numbers in a smaller unit than they are said to be in, the largest: a channel that moves by
-less than a degree or a millimetre is hardly used. Ours."""
+"""Largest number of a channel that must be exceeded in the larger unit: less than a degree or a
+millimetre is hardly a motion. Ours."""
 _STANDS = 0.02
 """Part of its largest number by which a channel moves at least that tells its unit. Ours."""
 _STARTS = 0.2
@@ -47,10 +47,9 @@ def check_scale(before: Demonstrations, selection: Selection) -> None:
 def appended(
     before: Demonstrations, more: Demonstrations, episodes: Sequence[str]
 ) -> Demonstrations:
-    """Return demonstrations with more of them; the shorter motions hold their last pose.
+    """Return demonstrations with more, which `inspect` aligned; short ones hold their last pose.
 
-    Those in use stay as they are, and the new ones, `episodes`, were aligned with them (`inspect`).
-    InvalidDemonstrationsError if they mean other numbers, or have a motion twice.
+    InvalidDemonstrationsError if names or units differ, or a motion comes twice.
     """
     ours, theirs = before.outcome_format, more.outcome_format
     _check_alike(
@@ -84,11 +83,22 @@ def appended(
     return replace(more, plans=plans, **both)
 
 
-def _is_there(before: Demonstrations, more: Demonstrations, i: int) -> bool:
-    """Whether a demonstration in use has the same outcome as a new one, and nearly its motion.
+def copies(plans: Plans, names: Sequence[str]) -> str:
+    """Name two identical motions, as a copied file or a plan that ran twice has them; else ""."""
+    first: dict[bytes, str] = {}
+    for plan, name in zip(plans, names, strict=True):
+        other = first.setdefault(plan.tobytes(), name)
+        if other != name:
+            return (
+                f"{other} and {name} are one motion to the last number; if a file was copied, drop "
+                "it; if one plan was executed twice, give it once, with the middle of where it "
+                "landed (--leave-out); else what was taken is no motion: see the channels"
+            )
+    return ""
 
-    The motion may begin a little earlier or later.
-    """
+
+def _is_there(before: Demonstrations, more: Demonstrations, i: int) -> bool:
+    """Whether a demonstration in use has a new one's outcome and motion, but for a small delay."""
     most = round(_CUT / before.format.dt)
     new = np.pad(more.plans[i], ((most, most + before.horizon), (0, 0)), mode="edge")
     span = largest_of_unit(np.ptp(more.plans[i], axis=0), more.format.units)

@@ -80,6 +80,10 @@ FORMATS: Mapping[str, Format] = {
 }
 """What can be read. `hdf5` covers robomimic, ManiSkill and ALOHA; `ros` ROS 1 bags, ROS 2 sqlite
 bags and MCAP; `zarr` is the replay buffer of Diffusion Policy."""
+_HOW_TO_SAVE = (
+    "save each episode as CSV (a line of names, a row a frame, the time in a column) or NPZ; what "
+    f"is read is {', '.join(FORMATS)} (--format, where a name does not tell)"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -407,7 +411,7 @@ def read(source: str | os.PathLike[str], options: ReadOptions | None = None) -> 
             f"{source} holds more than one episode named {', '.join(twice)}; rename their files"
         )
     if not there:
-        raise FileFormatError(f"{source} holds no episode of format {kind}; {_how_to_save()}")
+        raise FileFormatError(f"{source} holds no episode of format {kind}; {_HOW_TO_SAVE}")
     wanted = there if options.episodes is None else options.episodes
     missing = [e for e in (*wanted, *(options.leave_out or ())) if e not in there]
     if missing or not read_ones:
@@ -415,13 +419,6 @@ def read(source: str | os.PathLike[str], options: ReadOptions | None = None) -> 
         raise InvalidDemonstrationsError(f"{what} in {source}; it has {listed(there)}: name those")
     chosen = tuple(read_ones[name] for name in wanted if name in read_ones)
     return Recordings(source, kind, options, chosen, tuple(there))
-
-
-def _how_to_save() -> str:
-    return (
-        "save each episode as CSV (a line of names, a row a frame, the time in a column) or NPZ; "
-        f"what is read is {', '.join(FORMATS)} (--format, where a name does not tell)"
-    )
 
 
 def detect_format(source: Path) -> str:
@@ -444,4 +441,4 @@ def detect_format(source: Path) -> str:
                 f"{source} itself holds no recordings; name {folder}, which looks like "
                 f"{' or '.join(within)}{join}"
             )
-    raise FileFormatError(f"{source} holds nothing that can be read; {_how_to_save()}")
+    raise FileFormatError(f"{source} holds nothing that can be read; {_HOW_TO_SAVE}")

@@ -1,4 +1,4 @@
-"""What recordings hold, before anything is imported: time, channels, rests, noise, limits."""
+"""Report on recordings before an import: time, channels, rests, noise, limits."""
 
 from __future__ import annotations
 
@@ -9,14 +9,9 @@ from functools import cached_property
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.appending import check_scale
+from prior_reinforce.arm.recordings.appending import check_scale, copies
 from prior_reinforce.arm.recordings.naming import find_channels
-from prior_reinforce.arm.recordings.preprocessing import (
-    Preprocessed,
-    Preprocessing,
-    copies,
-    preprocess,
-)
+from prior_reinforce.arm.recordings.preprocessing import Preprocessed, Preprocessing, preprocess
 from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.selection import Selection
 from prior_reinforce.arm.recordings.takes import all_return, odd_starts
@@ -45,8 +40,8 @@ _SMOOTH_HZ = 20
 _SMOOTH = f"--smooth {_SMOOTH_HZ}"
 """Removes an encoder's noise; a throw has nothing above 20 Hz. Ours."""
 _WORST = 2.5
-"""Standard deviations that the worst of a plan's frames is off by. Ours: measured, 30 plans of 88
-frames, 2.3 to 2.9; what an end leaps by from rest is 1.3 to 2.4."""
+"""Standard deviations by which the noisiest frame of a plan is off. Ours: measured, 30 plans of 88
+frames, 2.3 to 2.9; an end leaps from rest by 1.3 to 2.4."""
 _TAKE_IT = (
     "take a gripper in: new --gripper percent, or any column by its name in [plan]; what is stored "
     "beside the motion, by --key given again"
@@ -306,12 +301,11 @@ class Inspection:
 
 
 def inspect(selection: Selection, wanted: Wanted) -> Inspection:
-    """Make plans of recordings, and check each against the robot's limits, once.
+    """Make plans of recordings, and check each against the robot's limits, if units allow it.
 
-    In units that the gate cannot judge, none is checked. InvalidDemonstrationsError as in
-    `check_held`, `check_scale`, `aligned` and `preprocess`, and UnclearUnitsError where `aligned`
-    refuses numbers in units that cannot be guessed; ConfigurationError if settings contradict each
-    other.
+    InvalidDemonstrationsError as in `check_held`, `check_scale`, `aligned` and `preprocess`;
+    UnclearUnitsError where a unit that cannot be guessed may be why; ConfigurationError if settings
+    contradict each other.
     """
     robot, before = wanted.robot, wanted.before
     check_held(selection.recordings, robot)

@@ -26,13 +26,12 @@ from prior_reinforce.plans.speeds import Channels, largest_of_unit
 from prior_reinforce.settings import Checked, NonNegative, Positive
 
 _ON_GRID = 0.02
-"""A frame within this share of a time step of where it should be is taken as recorded. Ours: at
-2 rad/s and 100 Hz that is 0.4 mrad, below the servo's own error."""
+"""Part of a time step by which a frame may be early or late and is kept as it is. Ours: at 2 rad/s
+and 100 Hz that is 0.4 mrad, below the servo's own error."""
 _OVERSHOOT = 0.01
 """A spline that leaves a channel's recorded range by more than this share of it is refused."""
 _NOISE_OVERSHOOT = 5.0
-"""And by more than so many standard deviations of its noise, as a step that is motion has to be:
-splines leave the range of noise by about as much as there is noise. Ours."""
+"""And by more than so many standard deviations of its noise, which splines overshoot too. Ours."""
 _BEGINS = 1e-3
 """Part of the fastest step of its unit above which a channel leaves its rest, noise aside. Ours: a
 plan that begins a little faster leaps from rest, and breaks limits of jerk."""
@@ -102,11 +101,10 @@ class Preprocessed:
 def preprocess(
     recordings: Sequence[Recording], form: PlanFormat, settings: Preprocessing
 ) -> Preprocessed:
-    """Trim and resample N recordings of D channels that are as in `form`, and to one horizon.
+    """Trim and resample N recordings of the channels of `form` to one horizon.
 
-    Increments are summed up before, and taken between frames after: half as many frames a second
-    have increments twice as large. Speeds rest at 0. The time step is `settings`', not `form`'s.
-    InvalidDemonstrationsError if an episode never moves, exceeds the horizon, or leaps.
+    Increments are summed up before and taken anew after. Speeds rest at 0. The time step is that of
+    `settings`. InvalidDemonstrationsError if an episode never moves, exceeds the horizon, or leaps.
     """
     units, increments = form.units, form.increments
     durations = [recording.duration for recording in recordings]
@@ -201,8 +199,7 @@ def _with_poses(recording: Recording, increments: Sequence[int]) -> Recording:
 def at_rests(recording: Recording, rest: float) -> list[Recording]:
     """Cut a recording wherever nothing moves for `rest` in [s], into `NAME-0`, `NAME-1`, ...
 
-    While nothing is recorded, nothing moves: some recorders pause with the arm. Increments and
-    speeds are 0 where nothing moves.
+    Nothing moves in gaps: some recorders pause with the arm.
     """
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
@@ -232,20 +229,6 @@ def at_rests(recording: Recording, rest: float) -> list[Recording]:
         )
         for i, (a, b) in enumerate(pairwise(cuts))
     ]
-
-
-def copies(plans: Plans, names: Sequence[str]) -> str:
-    """Name two identical motions, as a copied file or a plan that ran twice has them; else ""."""
-    first: dict[bytes, str] = {}
-    for plan, name in zip(plans, names, strict=True):
-        other = first.setdefault(plan.tobytes(), name)
-        if other != name:
-            return (
-                f"{other} and {name} are one motion to the last number; if a file was copied, drop "
-                "it; if one plan was executed twice, give it once, with the middle of where it "
-                "landed (--leave-out); else what was taken is no motion: see the channels"
-            )
-    return ""
 
 
 _Kind = IntEnum("_Kind", ["SLOW", "ENDS", "GAP", "FAILED", "READING", "STEP", "LONG"])
@@ -337,10 +320,9 @@ def _smoothed(
 
 
 def _held_while_unchanged(recording: Recording) -> Recording:
-    """A recording that was written at changes only, with the poses that it held in between.
+    """Fill the gaps of a recording that was written at changes only with the pose held there.
 
-    A gap across which every channel changes by little was no loss of frames in mid-swing: by less
-    than a frame of its swing, where frames are missing all over, else by much less.
+    Across such a gap every channel changes by little, unlike where frames were lost in mid-swing.
     """
     t, q, period = recording.times, recording.positions, recording.period
     steps, waits = np.abs(np.diff(q, axis=0)), np.diff(t)
