@@ -1,7 +1,7 @@
-"""Numbers that no arm makes: leaps of counters and of angles, failed reads, frames again and again.
+"""Errors of recorders: counters and angles that leap, failed reads, repeated frames.
 
-A gripper and a switch step between rests. What moves on after a leap as it moved before has not
-leapt: its numbers have, and a plan with them would sweep the whole way back in one frame.
+A gripper or a switch steps between rests; a joint that moves on after a leap as it did before has
+not leapt, only its numbers have.
 """
 
 from __future__ import annotations
@@ -57,10 +57,7 @@ Values = Float[np.ndarray, " T"]
 
 
 def refuse_leaps(recordings: Iterable[Recording], units: Sequence[str]) -> None:
-    """Refuse channels, and clocks, that leap in mid-motion.
-
-    InvalidDemonstrationsError names both values.
-    """
+    """Refuse channels and clocks that leap in mid-motion: InvalidDemonstrationsError."""
     for recording in recordings:
         _refuse_set_clock(recording)
         for channels, frame in _leaps(recording, units):
@@ -176,11 +173,10 @@ def _slopes(times: Times, values: Values, sigma: float) -> Iterator[float]:
 
 
 def failed_reads(recording: Recording, units: Sequence[str], still: Channels) -> Iterator[str]:
-    """Say which channels are elsewhere for one frame, and before and after it on their course.
+    """Remark on channels that are off their course for one frame, grippers and switches aside.
 
-    A frame counts if it is farther off than a channel strays at rest (`still`), than a few counts
-    of an encoder, and than the channel moves from frame to frame around it. Grippers are left out,
-    and switches, which rest before and after.
+    The frame is farther off than noise at rest (`still`), a few counts of an encoder, and the steps
+    around it.
     """
     t, q, of = recording.times, recording.positions, np.array(units)
     if len(t) < 4 or 2 * recording.period > _THERE_AND_BACK:
@@ -205,9 +201,9 @@ def failed_reads(recording: Recording, units: Sequence[str], still: Channels) ->
 
 
 def held_frames(recording: Recording) -> float | None:
-    """Return for how many frames each pose is held while the arm moves, None if for one.
+    """Return for how many frames each pose is held in mid-motion, None if for one.
 
-    What is rounded is held too, but moves by its counts; grippers may move by themselves.
+    Rounded numbers are held too, but move by single counts.
     """
     arm = [kind is not Kind.TOOL for kind in kinds(recording.names)]
     steps = np.abs(np.diff(recording.positions[:, arm], axis=0))
@@ -223,9 +219,9 @@ def held_frames(recording: Recording) -> float | None:
 
 
 def stalls(recording: Recording) -> Iterator[tuple[float, float]]:
-    """Return when, and for how long, the recorder repeats a frame while the arm moves on, in [s].
+    """Return when, and for how long, the recorder repeats a frame in mid-motion, in [s].
 
-    What dwells slows down before, and does not leap after; what is rounded moves by its counts.
+    An arm that rests slows down before, and does not leap after.
     """
     same = np.all(np.diff(recording.positions, axis=0) == 0, axis=1)
     new = np.flatnonzero(np.append(True, ~same))

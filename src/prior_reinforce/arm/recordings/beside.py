@@ -1,6 +1,6 @@
-"""What moves in a file beside the motion: a gripper, a rail, a second arm.
+"""Channels that move in a file beside the motion: a gripper, a rail, a second arm.
 
-Recorders call it as they like, so it is told by what it holds: a command repeats the motion.
+Recorders name them as they like, so numbers tell them apart: a command repeats the motion.
 """
 
 from __future__ import annotations
@@ -29,36 +29,37 @@ from prior_reinforce.plans.whole_turns import TURN
 
 Arrays = Mapping[str, np.ndarray]
 _MOST_BESIDE = 64
-"""Numbers a frame of what may be a part of the motion; ours: two hands have fewer, a lidar more."""
+"""Channels of an array that may be part of an arm, at most. Ours: two hands have fewer, a lidar
+more."""
 _ELSE = re.compile(
     r"(^|/)(next_obs|env_states?|timestamps?)/|(^|[/.])(actions?|states|objects?)$|(^|[/._])"
     r"(rewards?|dones?|success(es)?|is_first|is_last|(is_)?terminals?|terminated|truncated"
     r"|discounts?)$|(^|[/._])(cos|sin|modes?|status)($|_)|volt|control_output|camera|image|f_ext|dtheta",
     re.IGNORECASE,
 )
-"""Names of what moves and is no part of an arm: outcomes and whole states of a simulator."""
+"""Names of arrays that move and are no part of an arm: outcomes, whole states of a simulator."""
 MASK = re.compile(
     r"((is|frame|attention|episode)_)?(pad|padded|padding|valid|masks?|(pad|padding|valid)_mask)"
 )
 _SAME, _SHIFTS = 0.3, 21
-"""Part of its spread by which a reading may differ from another, and delays that are tried, up to a
-fifth of the recording either way. Ours: a command differs by what a controller lags behind."""
+"""Part of its spread by which a channel may differ from another reading of it, and how many delays
+are tried, up to a fifth of the recording either way. Ours: controllers lag behind commands."""
 _SCALES = (1.0, TURN["deg"] / TURN["rad"], TURN["rad"] / TURN["deg"], 1000.0, 100.0, 0.01, 0.001)
 """Factors between readings in two units."""
 _OTHER_ZERO = 1.0
-"""Part of its spread by which a command lies beside the motion at most, as under a load. Ours."""
+"""Part of its spread by which a command may be offset from the motion, as under a load. Ours."""
 _SIDE = re.compile(
     r"(?<!b)right|left|izq|der(?=ech)|gauche|droite?|(robot|arm|hand|gripper)_?\d+"
     r"|(?<![a-z])[lr](?![a-z])"
 )
-"""Which of two arms a name is of."""
+"""Sides of an arm in a name."""
 _FEWEST, _BENDS = 20, 6
-"""Frames of what moves at a rate of its own and has no times, and how often it goes through its
-range at most; ours: tables of other things jump."""
+"""Fewest frames of an array with a sample rate of its own and no time stamps, and how often it goes
+through its range at most. Ours: tables of other things jump."""
 
 
 def moving_beside(recordings: Iterable[Recording]) -> dict[str, tuple[float, float]]:
-    """Return what moves beside the motion in any recording, with its range in all; a base last."""
+    """Return the channels that move beside the motion, with their ranges; a mobile base last."""
     ends: dict[str, list[float]] = {}
     for recording in recordings:
         for low, high, name in recording.beside.values():
@@ -70,7 +71,7 @@ def moving_beside(recordings: Iterable[Recording]) -> dict[str, tuple[float, flo
 def columns_beside(
     names: Sequence[str], values: Positions, taken: Sequence[int], times: Times
 ) -> dict[str, Beside]:
-    """Return every column but those taken; numbered ones are one array."""
+    """Return the columns beside the motion's, which are `taken`; numbered ones are one array."""
     others = [i for i in range(len(names)) if i not in taken]
     bare = [split_unit(names[i], CHANNEL_UNITS)[0] for i in others]
     groups = [[others[i] for i in group] for group in vectors(bare).values()]
@@ -90,11 +91,11 @@ def arrays_beside(
     called: Sequence[str] = (),
     columns: Mapping[str, Sequence[str]] | None = None,
 ) -> dict[str, Beside]:
-    """Return every channel of other arrays than the motion, at its rate or their own.
+    """Return every channel of the arrays beside the motion, at its sample rate or their own.
 
-    `called` are names of the motion, and `columns` those of the arrays' channels. What moves has
-    the name of its array; but the numbers of where a base stands, lengths and angles, have theirs.
-    Arrays of several channels that are no part of an arm by their name are left out.
+    `called` are names of the motion, and `columns` those of the arrays' channels. A moving channel
+    is called by its array; those of a mobile base, lengths and angles, by their own names. Arrays
+    of several channels whose name is of no part of an arm are left out.
     """
     found = {}
     for name, values in others.items():
@@ -123,7 +124,7 @@ def arrays_beside(
 
 
 def twin_vectors(names: Sequence[str], values: Positions) -> Iterator[Ambiguity]:
-    """Ask which of two vectors of numbered columns is the motion, or of columns and commands."""
+    """Ask which of two vectors of numbered columns, or of columns and commands, is the motion."""
     groups = [(s, g) for s, g in vectors(names).items() if not says_no_position(s)]
     for (one, own), (other, of_other) in combinations(groups, 2):
         alike = len(own) == len(of_other) and not _of_another(other, [one])
@@ -145,7 +146,7 @@ def twin_vectors(names: Sequence[str], values: Positions) -> Iterator[Ambiguity]
 
 
 def _is_series(name: str, moving: np.ndarray, others: Arrays) -> bool:
-    """Whether an array of another length has its own rate: it has times, or changes as slowly."""
+    """Whether an array of another length is sampled over time: by time stamps, or smoothly."""
     for other, values in others.items():
         if other != name and values.shape == moving.shape[:1] and tells_time(other, values):
             return True
@@ -154,19 +155,19 @@ def _is_series(name: str, moving: np.ndarray, others: Arrays) -> bool:
 
 
 def _of_another(name: str, called: Sequence[str]) -> bool:
-    """Whether an array is by its name of another arm than the motion: the right one's."""
+    """Whether an array's name is of another arm than the motion: the right one."""
     own, of_motion = sides(name), {side for one in called for side in sides(one)}
     return bool(own - of_motion) and bool(of_motion or own & {"left", "right"})
 
 
 def sides(name: str) -> set[str]:
-    """Return which of several arms a name says that it is of: `left`, `r`, `robot1`."""
+    """Return the arms that a name mentions: `left`, `r`, `robot1`."""
     spaced = re.sub("(?<=[a-z])(?=[A-Z])", "_", name).lower()
     return {match.group().replace("_", "") for match in _SIDE.finditer(spaced)}
 
 
 def may_move(name: str, width: int = 1) -> bool:
-    """Whether an array of so many numbers a frame could be a part of the motion, by its name."""
+    """Whether an array of so many channels may be part of an arm, by its name."""
     own = name.rpartition("/")[2]
     other = (says_no_position(own) or says_time(own)) and not is_of_base(own)  # base_pose, base_T
     no_motion = other or MASK.fullmatch(own)
@@ -174,7 +175,7 @@ def may_move(name: str, width: int = 1) -> bool:
 
 
 def _moves(values: Times) -> bool:
-    """Whether what there is of a column moves, other than by noise."""
+    """Whether a channel moves by more than noise, where it has values."""
     values = values[np.isfinite(values)]
     if len(values) < 2 or np.ptp(values) <= 1e-9 * np.abs(values).max():
         return False
@@ -182,7 +183,7 @@ def _moves(values: Times) -> bool:
 
 
 def follows(values: np.ndarray, motion: Positions, scales: Sequence[float] = _SCALES) -> bool:
-    """Whether columns are another reading of the motion's: in another unit, or a command."""
+    """Whether channels repeat some of the motion's: in another unit, or as a command."""
     width, most = values.shape[1], motion.shape[1]
     if 0 < most < width and width % most == 0:  # several vectors under one name
         n = width // most

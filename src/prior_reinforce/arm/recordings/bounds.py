@@ -1,8 +1,7 @@
-"""How large recordings may be: checked from headers and counts, before anything is allocated.
+"""Limits on the size of recordings, far above what arms record; checks raise FileFormatError.
 
-A small file can claim, or unpack to, more than any machine holds; the limits of all readers stand
-here, each far above what arms record. Rows that are no table are refused here too. Every check
-raises FileFormatError.
+They are checked from headers, before anything is allocated: a small file can unpack to more than
+any machine holds. Rows that are no table are refused here too.
 """
 
 from __future__ import annotations
@@ -83,10 +82,7 @@ def check_names(where: object, names: Iterable[object]) -> None:
 
 
 def check_rows(where: str, rows: Sequence[tuple[int, Sequence[str]]]) -> None:
-    """Refuse YAML, and more names in the first row than any row below has cells.
-
-    Each row comes with the number of its line.
-    """
+    """Refuse YAML, and a header with more names than rows have cells; rows have line numbers."""
     if any(row == ["---"] for _, row in rows):
         raise FileFormatError(
             f"{where} is YAML, as ros2 topic echo prints it, and no table: record a bag, or print "

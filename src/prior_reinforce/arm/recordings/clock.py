@@ -1,4 +1,4 @@
-"""Times of the frames: from the file's own times, its rate, or the rate that is given."""
+"""Times of the frames: from time stamps, the file's frame rate, or the user's."""
 
 from __future__ import annotations
 
@@ -47,13 +47,13 @@ from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidD
 from prior_reinforce.units import without_number
 
 _IN_BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*[^\W\d_][^\[\]()]*?)\s*[\])]\s*$")
-"""`Time [weeks]`, a word in brackets."""
+"""A word in brackets at the end of a name: `Time [weeks]`."""
 _QUALIFIES = re.compile(
     r"rel(ative)?|abs(olute)?|local|utc|gmt|unix|epoch|elapsed|system|ros|robot|controller|pc", re.I
 )
-"""Words that say what kind of time it is, and no unit."""
+"""Words in brackets that are no unit, but a kind of time."""
 _HERTZ = re.compile(r"(\d+(?:[.,]\d+)?)[ _-]?hz", re.I)
-"""`throw_4_50Hz`."""
+"""A frame rate in an episode's name: `throw_4_50Hz`."""
 _APART = 3.0
 """Frames by which two clocks of one recording may differ. Ours: jitter is a frame or two."""
 _BRIEF = 0.5
@@ -74,10 +74,9 @@ def clock_of(
 
     Args:
         episode: Its name.
-        count: T.
-        options: The user's rate and unit of time. The rate must agree with the time stamps, and
-            with a declared rate that is plausible.
-        stamps: The file's time stamps; None where it has none.
+        count: Frames.
+        options: The user's rate and unit of time; the rate must agree with the file.
+        stamps: The file's time stamps, if there are any.
         name: Name of their column or array.
         unit: Unit that the format fixes for them; None reads it from the name, or infers it.
         declared: Frame rate that the file declares; time stamps must agree with it.
@@ -136,10 +135,7 @@ def _clock_at_rate(
 
 
 def _other_rates(episode: str, rate: float, declared: DeclaredRate | None) -> str:
-    """Say which other rates the episode's name and its file say beside the user's.
-
-    ConfigurationError if the file's is plausible.
-    """
+    """Name other rates in the episode's name or file; ConfigurationError if the file's may be."""
     in_name = _HERTZ.search(episode)
     stated = float(in_name[1].replace(",", ".")) if in_name else rate
     said = "" if same_rate(rate, stated) else f" (the name {episode} says {stated:g} Hz)"
@@ -276,10 +272,10 @@ def clock_among(
     numbers: Mapping[str, Any] | None = None,
     motion: Collection[str] = (),
 ) -> Clock:
-    """Return times from those arrays of an episode that are time stamps, held against each other.
+    """Return times from those arrays of an episode that are time stamps, which must agree.
 
-    `numbers` are further ones of the file, a rate perhaps among them. An array that the user names
-    counts more. Where no name says so, one that is no part of the `motion` may be the time.
+    `numbers` are further numbers of the file, perhaps a frame rate. An array that the user names
+    counts more. Where none is named a time, one that is not of the `motion` may be.
     """
     asked = options.time_column
     if asked not in (None, NO_COLUMN, *arrays):
@@ -303,7 +299,7 @@ def clock_among(
 def _rate_among(
     where: Path, numbers: Mapping[str, Any], count: int, given: float | None
 ) -> DeclaredRate | None:
-    """The declared rate, which may stand in every frame; a rate of each frame is none."""
+    """The declared rate, which may stand in every frame; rates that change are none."""
     found = {}
     for name, value in numbers.items():
         of_frames = np.shape(value) == (count,)
@@ -315,7 +311,7 @@ def _rate_among(
 
 
 def _are_periods(name: str, values: Any, count: int) -> bool:
-    """Whether values, of which each frame has one, are the times since the frame before."""
+    """Whether an array holds the sample period of each frame."""
     stamps = np.asarray(values)
     return stamps.shape == (count,) and is_periods(name.rpartition(".")[2], stamps)
 
@@ -329,7 +325,7 @@ def clock_at(
     options: ReadOptions,
     declared: DeclaredRate | None,
 ) -> Clock:
-    """Return the times of the found columns, held against others; by a rate if none is found."""
+    """Return the times in the found columns, which others must agree with; else by the rate."""
     if not found.columns:
         return clock_of(episode, count, options, declared=declared)
     name, stamps = columns[found.columns[0]]
@@ -345,10 +341,9 @@ def clock_at(
 
 
 def hold_together(where: str, clocks: Mapping[str, Times]) -> None:
-    """Refuse times of the same frames that contradict each other, the first being those in use.
+    """Refuse clocks of the same frames that contradict the first: FileFormatError names both.
 
-    Another clock may count in another unit, and begin anywhere; it may not run faster, or jump:
-    FileFormatError names both, with what they say.
+    Another clock may be in another unit and begin anywhere; it may not run faster, or jump.
     """
     (name, used), *others = clocks.items()
     period = float(np.median(np.diff(used)))
@@ -385,10 +380,9 @@ def hold_together(where: str, clocks: Mapping[str, Times]) -> None:
 def _judge(
     name: str, period: float, numbers: Times, said: str | None, by: str
 ) -> tuple[str, tuple[Ambiguity, ...]]:
-    """Infer the unit of a column of times, and say if it is ambiguous.
+    """Infer the unit of time stamps from their period, and doubt an implausible one.
 
-    `period` (between two frames) and the `numbers` are in that unit; `said` is what a person, the
-    name or the format gives, and `by` which of them: `its name says`.
+    `said` is the stated unit, and `by` who states it: `its name says`.
     """
     length = float(numbers[-1] - numbers[0]) if len(numbers) else 0.0
 

@@ -1,7 +1,6 @@
-"""Recordings in CSV of any dialect.
+"""Recordings in CSV of any dialect: a file an episode, or one file with a column `episode`.
 
-A file an episode, or one with a column `episode`. One column may hold the time; all others are
-channels. Logs of libfranka and of RTDE are known by their columns.
+Logs of libfranka and of RTDE are known by their columns.
 """
 
 from __future__ import annotations
@@ -124,7 +123,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
 
 
 def _has_other_columns(path: Path, paths: Sequence[Path], options: ReadOptions) -> bool:
-    """Whether a file has other columns than one of the first files beside it."""
+    """Whether a file has other columns than the first files beside it."""
 
     def columns(of: Path) -> tuple[str, ...]:
         with contextlib.suppress(FileFormatError):
@@ -135,7 +134,7 @@ def _has_other_columns(path: Path, paths: Sequence[Path], options: ReadOptions) 
 
 
 def tables_of_outcomes(source: Path, there: Sequence[str]) -> list[Path]:
-    """Return the files among recordings that look like their table of outcomes."""
+    """Return the files among recordings that look like a table of outcomes."""
     found = []
     for path in files_at(source, SUFFIXES) if source.is_dir() else ():
         with contextlib.suppress(FileFormatError):  # beside recordings of another format
@@ -144,7 +143,7 @@ def tables_of_outcomes(source: Path, there: Sequence[str]) -> list[Path]:
 
 
 def _has_a_row_each(table: Table, episodes: Sequence[str]) -> bool:
-    """Whether each row is of another episode, as in a table of outcomes."""
+    """Whether a table has one row an episode, as a table of outcomes has."""
     if not 1 < len(table) <= len(episodes):  # a recording's cells are not looked through for it
         return False
     key = key_column(table)
@@ -156,10 +155,10 @@ def _has_a_row_each(table: Table, episodes: Sequence[str]) -> bool:
 def _throws(
     table: Table, stem: str, options: ReadOptions, *, alone: bool
 ) -> tuple[int | None, Sequence[str], tuple[Ambiguity, ...]]:
-    """The column that says of which episode each row is, what it says, and what is only guessed.
+    """Return the column of episodes, if there is one, each row's episode, and what is guessed.
 
-    In a single file without such a column, times that begin anew part the episodes; else a column
-    that numbers long stretches of rows may.
+    In a single file without that column, a new episode begins where the time begins anew; or where
+    a column that numbers long stretches of rows changes.
     """
     whole = [stem] * len(table)
     if options.episode_column == NO_COLUMN:
@@ -197,12 +196,12 @@ def _throws(
 
 
 def _changes(cells: Sequence[str]) -> list[int]:
-    """Rows in which a column says something else than in the row before, with the first."""
+    """Return the rows in which a column changes, and the first."""
     return [k for k in range(len(cells)) if k == 0 or cells[k] != cells[k - 1]]
 
 
 def _refuse_labels_again(table: Table, column: int) -> None:
-    """FileFormatError if labels of episodes come again where another column changes: a session."""
+    """Refuse labels of episodes that begin anew with another column, such as a session."""
     said = [label for label in table.cells[column] if label]
     if len({*said}) == len(_changes(said)):
         return
@@ -219,7 +218,7 @@ def _refuse_labels_again(table: Table, column: int) -> None:
 
 
 def _starts(table: Table, options: ReadOptions) -> list[int]:
-    """Rows in which the time begins anew, with the first."""
+    """Return the rows in which the time begins anew, and the first."""
     time = next(iter(called_times(table, options)), None)
     if time is None or not table.is_number(time):
         return [0]
@@ -232,7 +231,7 @@ def _starts(table: Table, options: ReadOptions) -> list[int]:
 
 
 def _refuse_second_log(table: Table, times: Times) -> None:
-    """FileFormatError if the head comes again within the rows, and times do not go on there."""
+    """Refuse a header that comes again among the rows, unless the time goes on there."""
     for line in table.heads:
         row = int(np.searchsorted(table.lines, line))
         if 0 < row < len(table) and times[row] <= times[row - 1]:
@@ -326,8 +325,7 @@ def _episode(
 def _without_other_logs(table: Table, found: Sequence[int]) -> tuple[Table, tuple[str, ...]]:
     """Leave out rows of another log that was merged with that of the joints, and say so.
 
-    They hold values in columns that are mostly empty in rows of the joints, and none of a joint: a
-    row in which a recorder lost the joints alone is no such row.
+    They hold no joint, and values in columns that are mostly empty in rows of the joints.
     """
     empty = np.array([[not cell for cell in cells] for cells in table.cells])
     blank = empty[list(found)].all(axis=0) if found else np.zeros(len(table), dtype=bool)
@@ -343,7 +341,7 @@ def _without_other_logs(table: Table, found: Sequence[int]) -> tuple[Table, tupl
 def _refuse_text(
     table: Table, joints: Sequence[str], names: Sequence[str], found: Sequence[int]
 ) -> None:
-    """FileFormatError if joints are texts: names in a column of their own, or `True`."""
+    """Refuse joints that are texts: names in a column of their own, or `True`."""
     opens = Kind.TOOL in kinds(joints)
     for i, cells in enumerate(table.cells):
         if (len(joints) > 1 and {*joints} <= {*cells}) or is_long_format(table, i):
@@ -362,10 +360,10 @@ def _refuse_text(
 
 
 def _names_in_cells(table: Table, options: ReadOptions) -> tuple[dict[int, str], set[int]]:
-    """Names of numbered columns that stand in the cells of others, and which others these are.
+    """Return names of numbered columns that stand in cells, and the columns of these cells.
 
-    ROS writes `name0`, `name1`, ... beside `position0`, ..., or a cell of names beside one of
-    positions. FileFormatError where they change, as they do if two publishers are in one table.
+    ROS writes `name0`, `name1`, ... beside `position0`, ..., or lists of names and of positions.
+    FileFormatError where names change, as of two publishers.
     """
     texts = [i for i in range(len(table.names)) if table.named and table.is_text(i)]
     texts = [i for i in texts if not re.match(r"[-+.]?\d", table.cells[i][0])]  # `0.3 rad`
@@ -393,13 +391,13 @@ def _names_in_cells(table: Table, options: ReadOptions) -> tuple[dict[int, str],
 
 
 def _cells(table: Table, columns: Sequence[int], row: int) -> tuple[str, ...]:
-    """The texts of some cells of a row, or of the list in an only one."""
+    """Return the texts in some cells of a row, or in the list in a single cell."""
     own = [table.cells[i][row] for i in columns]
     return words(own[0] if len(own) == 1 else own)
 
 
 def _flag(table: Table, column: int) -> np.ndarray:
-    """A column's numbers; of `True`, as pandas writes it, 1, and of `False` 0."""
+    """Return a column's numbers, with 1 for `True`, as pandas writes it, and 0 for `False`."""
     said = {"true": 1.0, "false": 0.0}
     cells = zip(table.cells[column], table.values[:, column], strict=True)
     return np.array([said.get(cell.lower(), number) for cell, number in cells])
@@ -408,7 +406,7 @@ def _flag(table: Table, column: int) -> np.ndarray:
 def _by_key(
     table: Table, keys: Sequence[str], others: Sequence[int], joints: Sequence[str]
 ) -> list[int]:
-    """Columns of the motion by the name before their numbers; by their own, those beside them."""
+    """Return the columns that keys name: numbered ones by their common name, or a single one."""
     refuse_rates(table.where, keys, joints)
     names = [table.names[i] for i in others]
     groups = vectors(without_units(names)[0]) | vectors(names)

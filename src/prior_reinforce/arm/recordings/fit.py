@@ -1,9 +1,8 @@
 """Whether each outcome fits its motion: slips in a table of outcomes, found by the other rows.
 
-Outcomes are predicted from the main directions in which plans differ, each from the others. A slip
-of the pen (two rows exchanged, rows shifted by one or in another order, lost signs, a decimal
-point) is doubted where putting it right makes these predictions far better. Ours; linear, and so
-blind to small slips.
+Each outcome is predicted from the others, by the main directions in which plans differ. A slip of
+the pen (rows exchanged, shifted or in another order, lost signs, a decimal point) is reported where
+undoing it makes these predictions far better. Ours; linear, and so blind to small slips.
 """
 
 from __future__ import annotations
@@ -130,10 +129,7 @@ def _sides(directions: Float[np.ndarray, "N D"]) -> Iterator[Float[np.ndarray, "
 def _candidates(
     demonstrations: Demonstrations, episodes: tuple[str, ...], directions: Float[np.ndarray, "N D"]
 ) -> Iterator[tuple[tuple[int, ...], str, Points, float]]:
-    """Rows, what slip it is, the outcomes without it, and how much better they must be.
-
-    A row of nan is one whose outcome is not in the table.
-    """
+    """Yield rows, their slip, the outcomes without it (nan if not in the table), and `better`."""
     (n, k), outcomes = demonstrations.outcomes_seen.shape, demonstrations.outcomes_seen
     names = demonstrations.outcome_format.names
     every = tuple(range(n))

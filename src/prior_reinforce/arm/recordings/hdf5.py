@@ -104,9 +104,9 @@ def _demo(path: Path, top: Any, within: str, options: ReadOptions, episode: str)
 def _said(
     top: Any, group: Any, own: Any
 ) -> tuple[dict[str, tuple[str, ...]], dict[str, np.ndarray]]:
-    """Texts and numbers that attributes hold, and arrays of texts, the nearest to the motion first.
+    """Return texts and numbers in attributes and small arrays, the nearest to the motion first.
 
-    An only unit is of the motion if it stands at it, not at what holds it.
+    A single unit counts only at the motion itself.
     """
     texts: dict[str, tuple[str, ...]] = {}
     stated: dict[str, np.ndarray] = {}
@@ -129,7 +129,7 @@ def _said(
 
 
 def _is_small(group: Any, name: str) -> bool:
-    """Whether a name is of a data set of this very file that holds no more than names do."""
+    """Whether a name is of a data set of this very file, small enough to hold names."""
     import h5py
 
     hard = isinstance(group.get(name, getlink=True), h5py.HardLink)
@@ -146,7 +146,7 @@ def _is_own(found: Any) -> bool:
 
 
 def _numbers(path: Path, name: str, found: Any) -> Stamps:
-    """The numbers of an array, unpacked, unless its header claims more than a recording has."""
+    """Return the numbers of an array, unpacked; FileFormatError if its header claims too many."""
     for what, shape in ((name, found.shape), (f"a chunk of {name}", found.chunks or ())):
         check_numbers(path, what, shape, found.dtype.itemsize)
     numbers = np.asarray(found[()])
@@ -166,10 +166,10 @@ def _numbers(path: Path, name: str, found: Any) -> Stamps:
 
 
 def _own(path: Path, group: Any, key: str, depth: int = 8) -> Any:
-    """The item under a key, None if there is none; never anything of another file.
+    """Return the item under a key, None if there is none; FileFormatError if it is elsewhere.
 
-    A file can refer to others (external links, external storage, virtual data sets), and reading
-    it would copy whatever they hold into the workspace.
+    Reading external links, external storage or virtual data sets would copy any file of this
+    machine into the workspace.
     """
     import h5py
 

@@ -1,8 +1,8 @@
-"""Units of the selected channels: what is believed of each, what makes it doubtful, what is asked.
+"""Judge the units of the selected channels: believe, doubt, ask.
 
-A channel is in the unit that is stated for it, else in the plan's. Rules doubt that by its name and
-its largest number; the first that applies says what the numbers look like, and why. What nobody
-stated is asked about. What somebody stated is believed where an arm can do it, and remarked on.
+A channel is in its stated unit, else in the plan's. Rules doubt that by its name and its largest
+number; the first that applies names the likely unit. A unit that nobody stated is asked about; a
+stated one is believed where an arm can do it, with a remark.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ _MOST_PERCENT = 110.0
 _HARDLY_DEG, _STILL_DEG = 2.0, 0.1
 """Degrees within which a recorded arm hardly moves, and within which a joint is still. Ours."""
 _EXACT, _SCALED = 1e-6, 1e-3
-"""Within which numbers that were normalised reach their ends, and their mean and deviation: these
-are of what was taken, the ends of single precision. Ours."""
+"""Tolerance of the ends of normalised numbers, in single precision, and of their mean and
+deviation. Ours."""
 _BELOW_0 = 0.5
 """Part of its largest number, or of 1, by which an opening is below 0. Ours: zeros are a little
 off."""
@@ -161,10 +161,7 @@ class Judge:
 
     @cached_property
     def far(self) -> list[Belief]:
-        """Angles that are in degrees, not in radians as believed, and those that share their unit.
-
-        Joints of one recorder have one unit; if few are out of range, those numbered like these.
-        """
+        """Angles that look like degrees, not radians, with all or with those numbered like them."""
         far = [one for one in self.angles if self._looks(one) not in (one.unit, None)]
         near = max((one.largest for one in self.angles if one not in far), default=0.0)
         together = self.fixed or self.given or 2 * len(far) > len(self.angles)

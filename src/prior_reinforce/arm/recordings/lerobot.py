@@ -1,10 +1,9 @@
 """LeRobot data sets on disk, version 3.0 and 2.1, read with pyarrow alone.
 
-Layout (lerobot 0.6.1, datasets/utils.py): `meta/info.json`, episodes listed in
-`meta/episodes/**.parquet` (2.1: `meta/episodes.jsonl`), frames in `data/**.parquet`. Frames are
-collected by their own `episode_index`: the listed file pointers can be stale in converted data
-(huggingface/lerobot issue 2401), a file may hold several episodes, an episode several files. A file
-of a recorder (0.4.4) that ended without `finalize()` has no footer, and cannot be read.
+Layout (lerobot 0.6.1, datasets/utils.py): `meta/info.json`, episodes in `meta/episodes/**.parquet`
+(2.1: `meta/episodes.jsonl`), frames in `data/**.parquet`. Frames are collected by their own
+`episode_index`, as listed file pointers can be stale (huggingface/lerobot issue 2401). A file whose
+recorder (0.4.4) ended without `finalize()` has no footer, and cannot be read.
 """
 
 from __future__ import annotations
@@ -141,10 +140,9 @@ def _clock(
     rate: float,
     options: ReadOptions,
 ) -> Clock:
-    """Times by the frames' own numbers, since some may be missing, if their stamps agree with it.
+    """Return times by frame numbers, as frames may be missing; by time stamps if these are late.
 
-    LeRobot writes number / fps as `timestamp`; other recorders write when a frame was taken, which
-    counts where frames came late. What else tells the time is held against it.
+    LeRobot writes number / fps as `timestamp`, other recorders the time when a frame was taken.
     """
     asked = options.time_column not in (None, NO_COLUMN)
     stamps = clocks.get(_STAMPS, index / rate)

@@ -23,20 +23,19 @@ _OF_POSITIONS = re.compile(
 )
 """What follows a joint's name where tools write the messages' fields: `/elbow/position`."""
 Texts = Mapping[str, tuple[str, ...]]
-"""Texts of a file, by what it calls them."""
+"""Texts of a file, by their names in it."""
 OTHER_NAMES = re.compile(
     r"link|bod(y|ies)|camera|task|object|site|sensor|frame|goal|outcome|limit", re.I
 )
-"""Names in a file of what is not of the motion."""
+"""Names in a file of other things than the motion."""
 _DEEPEST = 12
 """Levels of dicts that are searched for names."""
 _NUMBERED = re.compile(r"(?P<stem>.*?)[_.\[ ]*(?P<number>\d+)\]?")
 
 
 def find_channels(wanted: Sequence[str], there: Sequence[str]) -> list[int] | None:
-    """Return the channel of each wanted joint; None if one is missing.
+    """Return the channel of each wanted joint, by `robots.limits.is_joint`; None if one is missing.
 
-    `joint4` is also `panda_joint4` and `joint4.pos`, and vice versa (`robots.limits.is_joint`).
     InvalidDemonstrationsError if two channels look like one joint.
     """
     found = [_find(name, there, wanted) for name in wanted]
@@ -50,10 +49,7 @@ def missing_channels(wanted: Sequence[str], there: Sequence[str]) -> list[str]:
 
 
 def vectors(names: Sequence[str]) -> dict[str, list[int]]:
-    """Return groups of consecutively numbered channels, by the name before the number.
-
-    Of `q[0]`, `q[1]`, `actual_q_0`, `actual_q_1`, `t` they are `{"q": [0, 1], "actual_q": [2, 3]}`.
-    """
+    """Return numbered channels by the name before the number: `{"q": [0, 1]}` of `q_0, q_1, t`."""
     groups: dict[str, list[tuple[int, int]]] = {}
     for index, name in enumerate(names):
         match = _NUMBERED.fullmatch(name.strip())
@@ -63,7 +59,7 @@ def vectors(names: Sequence[str]) -> dict[str, list[int]]:
 
 
 def joint_vectors(names: Sequence[str], count: int) -> dict[str, list[int]]:
-    """Return the groups of `vectors` of this size that no name calls velocities, torques, poses."""
+    """Return the groups of `vectors` of this size that may be positions, by their names."""
     return {
         stem: group
         for stem, group in vectors(names).items()
@@ -72,10 +68,7 @@ def joint_vectors(names: Sequence[str], count: int) -> dict[str, list[int]]:
 
 
 def numbered_like(joints: Sequence[str], there: Sequence[str]) -> tuple[str, ...] | None:
-    """Return the group of as many numbered channels as joints; None if it is not clear which.
-
-    Of several such groups, one named like positions is taken: `q` beside `a`; `dq` or `tau` never.
-    """
+    """Return the numbered channels that may be the joints: `q`, not `dq`; None if unclear."""
     fitting = joint_vectors(there, len(joints))
     called = [stem for stem in fitting if _POSITIONS.search(stem) is not None]
     clear = list(fitting) if len(fitting) == 1 else called
@@ -83,7 +76,7 @@ def numbered_like(joints: Sequence[str], there: Sequence[str]) -> tuple[str, ...
 
 
 def words(said: Any) -> tuple[str, ...]:
-    """Return the texts of an array, or of one text that lists several; none if they are none."""
+    """Return the texts in an array, or in one text that lists several; none if it holds others."""
     listed = said.ravel().tolist() if isinstance(said, np.ndarray) else said
     found = list(listed) if isinstance(listed, (list, tuple)) else [listed]
     found = [t.decode(errors="replace") if isinstance(t, bytes) else t for t in found]
@@ -96,7 +89,7 @@ def words(said: Any) -> tuple[str, ...]:
 
 
 def said_in(named: Mapping[str, Any]) -> tuple[dict[str, tuple[str, ...]], dict[str, float]]:
-    """Return the texts and numbers in what a file says of itself, by their place: `meta.fps`."""
+    """Return the texts and numbers in metadata of a file, by their path: `meta.fps`."""
     texts: dict[str, tuple[str, ...]] = {}
     numbers: dict[str, float] = {}
     for name, said in named.items():
@@ -109,7 +102,7 @@ def said_in(named: Mapping[str, Any]) -> tuple[dict[str, tuple[str, ...]], dict[
 
 
 def _search(place: str, said: Any, depth: int = _DEEPEST) -> Iterator[tuple[str, Any]]:
-    """Every number, text and list of texts in what is said, with its place."""
+    """Yield every number, text and list of texts in nested metadata, with its path."""
     said = said.tolist() if isinstance(said, np.ndarray) else said
     said = said[0] if isinstance(said, list) and len(said) == 1 else said
     said = said.decode(errors="replace") if isinstance(said, bytes) else said
@@ -138,7 +131,7 @@ def _search(place: str, said: Any, depth: int = _DEEPEST) -> Iterator[tuple[str,
 
 
 def _numbered(said: Mapping[Any, Any]) -> list[str]:
-    """Names that have their own number from 0 each, as `{"elbow": 0, "pan": 1}`; none of others."""
+    """Return names by the numbers that they have, as `{"elbow": 0, "pan": 1}`; none of others."""
     at = {str(n): str(name) for name, n in said.items() if isinstance(n, (int, str))}
     numbers = list(map(str, range(len(said))))
     return [at[number] for number in numbers] if sorted(at) == sorted(numbers) else []

@@ -1,8 +1,7 @@
 """Recordings in NPZ or NPY: a file an episode, or one file whose motion has shape (N, T, D).
 
-An NPY holds the motion alone. Arrays of an NPZ: the motion (`key`, or `q`, `plans`, `positions`,
-`actions`, or one array or field a joint), `t` or `dt` or `rate`, and optionally names of the
-joints, their units, `lengths`, and `outcome`, `outcomes` or `outcomes_seen`.
+An NPY holds the motion; an NPZ also `t`, `dt` or `rate`, and perhaps names, units, `lengths` and
+outcomes. There the motion is `key`, `q`, `plans`, `positions`, `actions`, or an array a joint.
 """
 
 from __future__ import annotations
@@ -138,10 +137,7 @@ def _arrays(path: Path) -> Arrays:
 
 
 def _times(name: str, array: np.ndarray) -> np.ndarray:
-    """Dates and times in the unit that their name says, else in [s], nan where one is missing.
-
-    Other arrays as they are.
-    """
+    """Return dates and times as numbers, in the unit in their name, else in [s]; others as is."""
     if array.dtype.kind == "M":
         array = array - np.datetime64(0, "s")
     if array.dtype.kind != "m":

@@ -1,4 +1,4 @@
-"""Which recording a row of a table of outcomes is of, and which component a column is."""
+"""Match the rows of a table of outcomes to recordings, and its columns to components."""
 
 from __future__ import annotations
 
@@ -54,10 +54,7 @@ Key = tuple[str, tuple[str, ...]]
 
 
 def digits_at_end(name: str) -> str:
-    """Return the number at the end of a name, without leading zeros; empty if there is none.
-
-    The last digits of a time, `2024-05-03_14-02-03` or `14-02-03`, are no number of an episode.
-    """
+    """Return the number at the end of a name, without leading zeros; empty if none or a date."""
     match = re.search(r"0*([0-9]+)$", _whole(name))
     return match[1] if match and not _DATED.search(name) else ""
 
@@ -81,11 +78,10 @@ def _numbers(name: str) -> dict[str, str]:
 def telling_word(
     word: str, episodes: Sequence[str], there: Sequence[str], rows: Sequence[str]
 ) -> str:
-    """Return the word if rows give the number behind it; empty if they give the one at the end.
+    """Return the word whose number the rows give; empty if they give the number at the end.
 
-    The first counts if it tells the `episodes` apart, unless only the other is `there` for all rows
-    that are no whole names, or for all episodes where rows are of others, too.
-    InvalidDemonstrationsError if other numbers are there for all rows, and the word decides not.
+    The given word counts if it tells the `episodes` apart, unless only the number at the end is
+    there for all rows. InvalidDemonstrationsError if several numbers are, and no word decides.
     """
     wanted = {digits_at_end(row) for row in rows if row not in there} - {""}
     if not wanted or not episodes:
@@ -121,8 +117,8 @@ def names_in(table: Table, column: int) -> tuple[str, ...]:
 def keys_of(table: Table, first: int, beside: Collection[int]) -> list[Key]:
     """Return columns that may name the recordings: the first, others called so, and texts.
 
-    A column of few labels, as of sessions, does not where another has one for each row.
-    FileFormatError if a row comes again.
+    Labels of sessions are left out where another column tells all rows apart. FileFormatError if a
+    row comes again.
     """
     lower = [name.lower() for name in table.names]
     named = [first, *(i for i in beside if i != first and lower[i] in ROW_COLUMNS)]
@@ -178,12 +174,11 @@ def telling_column(
 
 
 def _telling_columns(keys: Sequence[Key], there: Sequence[str], where: str) -> Sequence[Key]:
-    """The columns by which rows are matched to recordings.
+    """Return the columns by which rows are matched to recordings.
 
-    A column of file names that names every recording decides. Else all count that name each row
-    otherwise, and have to agree. Where only several columns together tell rows apart, as run and
-    throw do, recordings are matched that are numbered by both (`run1_throw2`);
-    InvalidDemonstrationsError if they are not.
+    File names of all recordings decide. Else every column counts that tells all rows apart. If only
+    several columns do so together, as run and throw do, recordings must be numbered by both
+    (`run1_throw2`): InvalidDemonstrationsError.
     """
     named = [key for i, key in enumerate(keys) if i == 0 or key[0] in ROW_COLUMNS]
     alone = [key for key in named if len({*key[1]}) == len(key[1])]
@@ -256,9 +251,9 @@ def columns_of(names: Sequence[str], there: Sequence[str]) -> dict[str, list[tup
 
 
 def other_places(path: Path, names: Collection[str], beside: Sequence[str]) -> list[str]:
-    """Return columns that are of other places, `goal_x` and `goal_y` beside `x` and `y`.
+    """Return columns of other places, `goal_x` and `goal_y` beside `x` and `y`.
 
-    FileFormatError if they may be the outcomes as well, as `landing_x` and `landing_y`.
+    FileFormatError if they may be outcomes as well: `landing_x` and `landing_y`.
     """
     sets = defaultdict[tuple[str, ...], dict[str, str]](dict)
     for name in beside:

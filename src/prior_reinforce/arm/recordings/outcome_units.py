@@ -32,13 +32,11 @@ _NEAR_THE_BASE = 0.05
 def in_units(
     outcomes: Outcomes, wanted: Sequence[str] | None, given: str | None
 ) -> tuple[Outcomes, tuple[Ambiguity, ...]]:
-    """Convert outcomes to the wanted units; also return what is only inferred of their units.
+    """Convert outcomes to the wanted units, or to metres; also return units that are only guessed.
 
-    `wanted` None takes the stated units, or metres. `given` is the unit of components whose source
-    states none, or of all to confirm an ambiguous one; None takes the wanted unit, or if no arm
-    reaches that far, a plausible one. ConfigurationError if a unit cannot be converted, `given` has
-    no use, or one `sd` is for several units; InvalidDemonstrationsError if a stated unit is
-    impossible.
+    `given` is the user's unit of components without one, or confirms an ambiguous one.
+    ConfigurationError if a unit cannot be converted, `given` has no use, or one `sd` is for several
+    units; InvalidDemonstrationsError if a stated unit is impossible.
     """
     said, where, given = outcomes.units, outcomes.where, given and (known_unit(given) or given)
     wanted = wanted and [known_unit(unit) or unit for unit in wanted]
@@ -133,10 +131,7 @@ def _unmeasured(outcomes: Outcomes) -> Iterator[str]:
 def _shared_unit(
     outcomes: Outcomes, wanted: Sequence[str]
 ) -> tuple[Outcomes, tuple[Ambiguity, ...]]:
-    """Give lengths of no unit that of the others, `cm` of `x_cm, y`, and ask about it.
-
-    It cannot be guessed where their numbers look like the wanted unit.
-    """
+    """Give lengths without a unit that of the others, `cm` of `x_cm, y`, and ask about it."""
     scale, k = np.array(outcomes.scale), range(len(wanted))
     lengths = [j for j in k if kind_of(wanted[j]) == "length"]
     unsaid = [j for j in lengths if outcomes.units[j] is None]
@@ -187,8 +182,7 @@ def _refuse_one_unit(outcomes: Outcomes, wanted: Sequence[str], unclear: Sequenc
 def _refuse_odd_row(outcomes: Outcomes, units: Sequence[str], given: str | None) -> None:
     """Refuse a few rows in another unit than the others: 95 beside 0.8 and 1.05, or 0.9 beside 80.
 
-    InvalidDemonstrationsError names them: an arm reaches the others and not these, or in another
-    unit they would lie among the others. `given` confirms the second where units are stated.
+    An arm reaches only the others, or in another unit these would lie among them.
     """
     numbers, right = np.abs(outcomes.values).T, ""
     for number, own, unit in zip(numbers, outcomes.units, units, strict=True):

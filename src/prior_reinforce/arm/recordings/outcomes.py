@@ -1,9 +1,8 @@
-"""Where each demonstration's object landed: from a table, since no recording format holds it.
+"""Read where each demonstration's object landed, from a table: no recording format holds it.
 
-`outcomes.csv` has a line of column names, `episode` among them; every other column is a component
-of the outcome, except `source`, `note`, `comment`, and `sd`, the standard deviation of the row's
-components. A column `x_cm` or `x [mm]` is converted to `x` in metres, an angle likewise to radians,
-and a time to seconds; any other unit in brackets is kept: `volume [ml]`.
+`outcomes.csv` has a header with `episode`; every other column is a component of the outcome, but
+for `source`, `note`, `comment`, and `sd`, the standard deviation of the row's components. `x_cm`
+and `x [mm]` are converted to metres, angles to radians, times to seconds; `volume [ml]` is kept.
 """
 
 from __future__ import annotations
@@ -104,8 +103,7 @@ class Outcomes:
     def only(self, names: Sequence[str]) -> Outcomes:
         """Return some components, in that order; InvalidDemonstrationsError if one is missing.
 
-        A column may be called by where it counts up to, as seen from the base: `ahead` is x, `left`
-        y, and `right` is y of the opposite sign.
+        Directions from the base are components too: `ahead` is x, `left` is y, `right` is -y.
         """
         columns = columns_of(names, self.names)
         missing = [name for name, found in columns.items() if not found]
@@ -170,10 +168,7 @@ def write_outcome_table(
     units: Sequence[str],
     beside: str = "note",
 ) -> None:
-    """Write a table of outcomes as a CSV, with the units known here in its head.
-
-    Cells by episode are components, then that of the column `beside`; missing ones stay empty.
-    """
+    """Write a table of outcomes as a CSV: each episode's components, then the column `beside`."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     known = zip(names, units, strict=True)
@@ -208,8 +203,7 @@ def key_column(table: Table) -> int | None:
 def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
     """Read a table of outcomes, a CSV of any dialect; rows with empty cells are skipped.
 
-    `names` are the components wanted; None takes all columns but the index and notes, which are
-    also what has no digit in it, by whatever name.
+    `names` are the wanted components; None takes all columns but the index and notes.
     FileFormatError if it is no such table, or a cell is no number.
     """
     example = "episode,x,y"
@@ -291,9 +285,8 @@ def _is_text(cells: Sequence[str]) -> bool:
 def _doubt_thousands(table: Table, columns: Mapping[int, str | None]) -> None:
     """Refuse `1.488` beside `-302`: is that one and a half, or one and a half thousand?
 
-    FileFormatError if every number with a decimal sign may be a whole one of four digits or more,
-    beside whole hundreds, or with a point where semicolons say that commas are decimal signs.
-    `columns` have units that are stated, or None.
+    So if every number with a decimal sign may be a thousand, and others are whole hundreds, or
+    semicolons part cells, beside which a comma is the decimal sign. `columns` are those with units.
     """
     cells = [(table.cells[i][row], row, i) for i in columns for row in range(len(table))]
     signed = [each for each in cells if table.decimal in each[0]]
@@ -373,10 +366,9 @@ def check_rows(
 ) -> Outcomes:
     """Check that every row is of one of the `chosen` episodes, or of another that is `there`.
 
-    With `others`, rows of none are no mistake unless the table looks numbered from another number.
-    Returns the outcomes with the `episodes` and the `word` that hold for the recordings.
-    InvalidDemonstrationsError if a row is of none, or several numbers fit (`telling_word`), or
-    columns differ (`telling_column`).
+    With `others`, rows of none are no mistake unless the table counts from another number. Returns
+    the outcomes with the `episodes` and the `word` that match. InvalidDemonstrationsError if a row
+    is of none, or as in `telling_column`.
     """
     keys = (outcomes.word, outcomes.episodes), *outcomes.also
     word, rows = telling_column(keys, chosen, there, outcomes.where)
@@ -399,10 +391,9 @@ def check_rows(
 
 
 def in_order(source: Path, motions: Sequence[str], outcomes: Outcomes, advice: str) -> Outcomes:
-    """Match outcomes of the motions that one file was cut into in their order.
+    """Match outcomes to the motions that one file was cut into, by their numbers or their order.
 
-    That is the order of the numbers that end their names, or of their rows.
-    InvalidDemonstrationsError ends in the advice, if there is any, where they are not as many.
+    InvalidDemonstrationsError, with the advice, if they are not as many.
     """
     rows = outcomes.episodes
     if len(motions) != len(rows):
@@ -422,11 +413,11 @@ def outcomes_of(
     outcomes: Outcomes,
     advice: Callable[[Sequence[str]], str] = lambda missing: "",
 ) -> tuple[Points, Points]:
-    """Return each episode's outcome in order, and its standard deviation, each (N, k).
+    """Return each episode's outcome, and its standard deviation, each (N, k).
 
-    Episodes are matched by name, else by the number behind the outcomes' `word` or at the end of
-    their names (`3` is `demo_003`). `advice` is for who lacks some, of those.
-    InvalidDemonstrationsError names outcomes that are missing or not finite.
+    Episodes are matched by name, else by the number behind the outcomes' `word` or at the end:
+    `3` is `demo_003`. InvalidDemonstrationsError, with the `advice`, if one is missing or not
+    finite.
     """
     there = outcomes.episodes
     if missing := missing_outcomes(episodes, outcomes):

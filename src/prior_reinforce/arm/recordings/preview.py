@@ -182,10 +182,7 @@ class Preview:
         return figure
 
     def save(self, folder: Path) -> Path:
-        """Draw it into a folder, and return the picture's path.
-
-        WorkspaceError if it cannot be written; an older picture is taken away.
-        """
+        """Draw it into a folder, and return its path; WorkspaceError, and no old picture, else."""
         picture = folder / "demonstrations.png"
         try:
             with named_disk_errors(folder):

@@ -30,20 +30,19 @@ from prior_reinforce.files import without_advice
 Positions = Float[np.ndarray, "T D"]
 """D channels at T times, in their units."""
 Episodes = Iterable[tuple[str, Callable[[], "Recording"]]]
-"""What a format's reader yields: names, and how to read each; left-out episodes are never read."""
+"""Names of a source's episodes, and how to read each; those left out are never read."""
 _WIDER = 5
-"""Times as many columns without names as frames that no motion has. Ours."""
+"""Columns without names to a frame that no motion has. Ours."""
 MOST_LOST = 0.1
-"""Share of an episode's frames that may be lost. Ours: lost packets come in bursts of some frames;
-where more is missing, the recorder failed."""
+"""Part of an episode's frames that may be lost. Ours: beyond that, the recorder failed."""
 _LEAP = 3.0
-"""Steps of a motion, as large as its largest, that make a leap. Ours."""
+"""A leap is so many times a motion's largest step. Ours."""
 EPISODE_COLUMNS = tuple(
     name + ending
     for name in ("episode", "throw", "trial", "demo", "run", "wurf", "versuch", "essai", "tiro")
     for ending in ("", "_id", "_index", "_number")
 )
-"""Names of a column that says of which episode a row is."""
+"""Names of a column that says to which episode a row belongs."""
 ROW_COLUMNS = (*EPISODE_COLUMNS, "take")
 """The same in a table with a row a recording."""
 
@@ -56,8 +55,7 @@ class Beside(NamedTuple):
     high: float
     """Greatest value."""
     moving: str = ""
-    """What to call it, alone or with those numbered like it, where it moves and may be a part of
-    the arm; else empty."""
+    """Name, of it or of its array, if it moves and may be part of an arm; else empty."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,11 +191,10 @@ def recorded(
 
 
 def _without_zeros(positions: Positions) -> tuple[int, int]:
-    """First frame and end of those without the outer ones that are all 0, if a motion leaps there.
+    """Return the first frame and the end of a motion without frames of 0 at either end.
 
-    Zeros fill up what is shorter than others, and are read before a driver is up. A motion leaps
-    into them: at least two of its channels, or its only one, at once and by more than in any frames
-    between.
+    Zeros pad short episodes, and are read before a driver is up. Two channels or more, or the only
+    one, leap into them by more than they ever step.
     """
     count = len(positions)
     others = np.flatnonzero(np.any(positions != 0, axis=1))
@@ -211,12 +208,12 @@ def _without_zeros(positions: Positions) -> tuple[int, int]:
 
 
 def unread() -> Recording:
-    """Stand for an episode that was left out before any of it was read."""
+    """Stand in for an episode that was left out unread."""
     raise AssertionError("left-out episodes are never read")
 
 
 def without_units(names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str | None, ...]]:
-    """Return names without units, and the units; names that would then coincide all stay.
+    """Return names without units, and the units; whole names if they would coincide else.
 
     A word in square brackets is a unit, `pressure [bar]`, unless it tells names apart: `q[elbow]`.
     """
@@ -234,8 +231,7 @@ def without_units(names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str | No
 def named_damage(path: Path, what: str) -> Iterator[None]:
     """Turn whatever a format's library raises on a damaged file into one FileFormatError.
 
-    Broad on purpose: parsers raise anything on damaged bytes (struct.error, UnicodeDecodeError,
-    RuntimeError, KeyError, their own classes). Keep only parsing inside.
+    Parsers raise anything on damaged bytes: keep only parsing inside.
     """
     try:
         yield
@@ -251,7 +247,7 @@ def named_damage(path: Path, what: str) -> Iterator[None]:
 
 @contextmanager
 def or_leave_out(episode: str, differs: Callable[[], bool]) -> Iterator[None]:
-    """Add to what is said against a file that differs from those beside it: it may be left out."""
+    """Add to an error about a file that differs from the others that it may be left out."""
     try:
         yield
     except (FileFormatError, InvalidDemonstrationsError) as error:
@@ -281,7 +277,7 @@ def files_at(source: Path, suffixes: tuple[str, ...]) -> list[Path]:
 
 
 def is_hidden(path: Path) -> bool:
-    """Whether a path is none of its folder's recordings: macOS adds a `._a.csv` to `a.csv`."""
+    """Whether a path is hidden: macOS adds a `._a.csv` to `a.csv`."""
     return path.name.startswith((".", "~"))
 
 

@@ -42,7 +42,7 @@ _OF_NO_JOINT = re.compile(
     r"|lifecycle_msgs|rosbag_msgs)/|/(Image|CompressedImage|CameraInfo|LaserScan|PointCloud2?|Imu"
     r"|MagneticField|NavSatFix|Joy|BatteryState|Temperature)$"
 )
-"""Types of messages that no lift or gripper sends: of ROS itself, places, cameras and the like."""
+"""Types of messages that no lift or gripper sends: ROS's own, poses, sensors."""
 _MAGIC, _HEAD = b"\x89MCAP0\r\n", struct.Struct("<8sBQI")
 """How an MCAP begins: these bytes, a record's kind and length, and the length of its first text."""
 _TIME = re.compile(r"builtin_interfaces/msg/(Time|Duration)|std_msgs/msg/Header")
@@ -161,7 +161,7 @@ def _refuse_other_messages(path: Path) -> None:
 
 
 def _numbers(topic: str, message: Any) -> Any:
-    """A message as one of joints that are called by its topic; those of joints as they are."""
+    """Turn a message of numbers into one of joints named by its topic; leave one of joints."""
     if message.__msgtype__ in (_STATE, _TRAJECTORY):
         return message
     fields = {
@@ -180,7 +180,7 @@ def _numbers(topic: str, message: Any) -> Any:
 
 
 def _fields(message: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    """Every number or array of numbers in a message, by its path; none of times and headers."""
+    """Yield the numbers and arrays in a message with their paths, without times and headers."""
     for name, value in vars(message).items():
         kind = getattr(value, "__msgtype__", None)
         if isinstance(value, (bool, int, float)) or (
@@ -192,9 +192,9 @@ def _fields(message: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _beside(topic: str, messages: Sequence[Message]) -> dict[str, Beside]:
-    """The numbers of a topic; what moves is the only one, or only list of numbers, that does.
+    """Return the numbers of a topic; they count as moving if a single one, or one list, moves.
 
-    Several in one message are mostly a pose, or of a driver; but where a base stands is named.
+    Several in a message are mostly a pose, or a driver's; those of a mobile base all count.
     """
     names = messages[0].content.name if messages else []
     rows = [m.content.position for m in messages]
@@ -211,7 +211,7 @@ def _beside(topic: str, messages: Sequence[Message]) -> dict[str, Beside]:
 
 
 def _messages(reader: Any, connections: Sequence[Any]) -> list[Message]:
-    """The messages of a topic; of one that no joint, lift or gripper sends, none.
+    """Return a topic's messages, none of one that no joint, lift or gripper sends.
 
     Trajectories of one point each are a stream of set points.
     """
@@ -230,7 +230,7 @@ def _messages(reader: Any, connections: Sequence[Any]) -> list[Message]:
 
 
 def _set_point(trajectory: Any) -> Any:
-    """A trajectory of one point as a message of joints, at the time by which it is reached."""
+    """Turn a trajectory of one point into a message of joints, when it is to be reached."""
     (point,) = trajectory.points
     stamp, wait = trajectory.header.stamp, point.time_from_start
     when = SimpleNamespace(sec=stamp.sec + wait.sec, nanosec=stamp.nanosec + wait.nanosec)
@@ -241,7 +241,7 @@ def _set_point(trajectory: Any) -> Any:
 
 
 def _topic(bag: Path, reader: Any, key: str | None, *, beside: bool) -> tuple[list[Any], str]:
-    """The connections and the type of a topic of joints; beside another, also of numbers."""
+    """Return the connections and the type of a topic of joints; of numbers too, with `beside`."""
     kinds = {c.topic: c.msgtype for c in reader.connections}
     usable = {topic: kind for topic, kind in kinds.items() if kind in (_STATE, _TRAJECTORY)}
     if key is None and len(usable) == 1:

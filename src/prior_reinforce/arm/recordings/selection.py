@@ -1,4 +1,4 @@
-"""Match recorded channels to the plan's, with their units, and note what moves and is left out."""
+"""Match recorded channels to the plan's, with their units."""
 
 from __future__ import annotations
 
@@ -37,8 +37,7 @@ from prior_reinforce.wording import listed
 
 _LIKE_RATES = "look like velocities, torques or the like"
 _BEYOND = 5.0
-"""A few frames that are so many times as large, or lead so many times as far, as all others were
-not read. Ours: a motion passes through what lies between."""
+"""A few frames so many times as large, or as far away, as all others were not read. Ours."""
 _NOT_READ = (
     "as where a read failed: write nan there, so that they are left out as lost frames are, or "
     "leave that episode out (--leave-out)"
@@ -60,8 +59,7 @@ class Selection:
     remarks: tuple[str, ...] = ()
     """Warnings for a person."""
     other_unit: str = ""
-    """The option for the unit that the numbers look like, where that is not the one used and one
-    option can give it; else empty."""
+    """The option for another unit that the numbers look like; empty if no one option gives it."""
     left_out: str = ""
     """Channels that move and are not part of the plan, with their ranges; else empty."""
 
@@ -85,15 +83,12 @@ def select(
     *,
     normalised: bool = False,
 ) -> Selection:
-    """Pick, order, convert and rename the channels of every recording.
+    """Pick, order, convert and rename the channels of every recording; drop frames of nan.
 
-    Frames with a value that is not finite are dropped, as lost packets are. `joints` and `units`
-    are those of `ReadOptions`, `names` and `plan_units` those of `import_demonstrations`; with
-    `normalised`, the recorder also writes shares of each joint's range. One of `plan_units` holds
-    for all joints.
-
-    InvalidDemonstrationsError if a recording lacks a joint, or too many frames; ConfigurationError
-    if names or units are not as many as joints, or units differ.
+    `joints` and `units` are those of `ReadOptions`, `names` and `plan_units` (one may hold for all)
+    those of `import_demonstrations`; with `normalised`, the recorder also writes shares of each
+    joint's range. InvalidDemonstrationsError if a recording lacks a joint, or too many frames;
+    ConfigurationError if names or units are not as many as joints, or units differ.
     """
     joints = tuple(joints) if joints is not None else recordings[0].names
     if _are_all_columns(joints, recordings, names):
@@ -166,7 +161,7 @@ def select(
 
 
 def _are_unsettled(recordings: Sequence[Recording]) -> bool:
-    """Whether it is asked which columns the motion is: of which units is then not yet."""
+    """Whether the user is still asked which columns the motion is, and so not yet for units."""
     asked = [one for r in recordings for one in r.ambiguities if not one.guessed]
     return any(one.option.startswith(("--joints", "--key")) for one in asked)
 
@@ -174,7 +169,7 @@ def _are_unsettled(recordings: Sequence[Recording]) -> bool:
 def _are_all_columns(
     joints: Sequence[str], recordings: Sequence[Recording], names: Sequence[str] | None
 ) -> bool:
-    """Whether the joints name all columns of recordings without names, more than the plan's."""
+    """Whether the joints name all columns of recordings without a header, more than the plan's."""
     few = names is not None and len(names) < len(joints) == len({*joints})
     return (
         few
@@ -205,7 +200,7 @@ def _refuse_places(
 def _guess_names(
     recording: Recording, joints: tuple[str, ...]
 ) -> tuple[tuple[str, ...], tuple[Ambiguity, ...]]:
-    """The recorded names of the joints, if they can only be guessed: `q0`, `q1`, ..."""
+    """Guess the recorded names of the joints: numbered channels, or all in their order."""
     if any(one.option.startswith("--joints") for one in recording.ambiguities):
         return joints, ()
     own = recording.columns != recording.names  # numbered columns of a log whose order is known
@@ -239,7 +234,7 @@ def _doubt_first(columns: Sequence[str], moving: Sequence[str]) -> tuple[Ambigui
 
 
 def _holds(recording: Recording, joints: tuple[str, ...]) -> bool:
-    """Whether it is clear which of its channels are the joints."""
+    """Whether the recording holds the joints, each once."""
     with suppress(InvalidDemonstrationsError):
         return find_channels(joints, recording.names) is not None
     return False
@@ -298,12 +293,11 @@ def _columns(
 def _refuse_failed_reads(
     episode: str, called: Sequence[str], positions: np.ndarray, joints: Sequence[str]
 ) -> None:
-    """Refuse what a recorder writes in a few frames where it read nothing, such as -999.
+    """Refuse a placeholder for failed reads, such as -999, in a few frames.
 
-    It is far beyond all other frames, and beyond those of all channels of its kind. Increments and
-    speeds are large in a few frames alone, and tools open for a few: these are not judged, unless
-    a tool opens by less than nothing. In the first and last frame, and where all others are 0, a
-    motion may be as large: only what no angle reaches in any unit is refused there.
+    It is far beyond all other frames, and all channels of its kind. Increments, speeds and tools
+    may be large in a few frames. In the first and last frame, and where all others are 0, a motion
+    may be as large, so only impossible angles are refused there.
     """
     size, of_kind = np.abs(positions), kinds(joints)
     most = size.max(axis=0, initial=0.0)
@@ -327,10 +321,7 @@ def _refuse_failed_reads(
 
 
 def _refuse_empty_frames(episode: str, positions: np.ndarray, joints: Sequence[str]) -> None:
-    """Refuse frames of nothing but 0 amid a motion, such as a recorder's lost packets are.
-
-    All that moves leaps there and back, farther than ever else.
-    """
+    """Refuse frames of 0 in mid-motion, as of lost packets: all channels leap there and back."""
     ranges = np.ptp(positions, axis=0)
     moves = [
         i
@@ -351,7 +342,7 @@ def _refuse_empty_frames(episode: str, positions: np.ndarray, joints: Sequence[s
 
 
 def _picked(recording: Recording, columns: list[int], joints: tuple[str, ...]) -> Recording:
-    """Some channels, without the few frames in which one of them is not finite."""
+    """Return some channels, without frames in which one of them is not finite."""
     positions, remarks = recording.positions[:, columns], recording.remarks
     called = tuple(recording.columns[i] for i in columns)
     bad = ~np.isfinite(positions)

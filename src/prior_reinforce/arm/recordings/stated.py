@@ -1,6 +1,6 @@
-"""What a file says of the motion that it holds: its names and units, its rate, its length.
+"""Find the motion among a file's arrays, with the names, units and length that the file states.
 
-Recorders call it as they like, so it is told by what it holds: names are as many as columns.
+Recorders name these as they like, so contents count: names are as many as columns.
 """
 
 from __future__ import annotations
@@ -54,22 +54,21 @@ _FRAMES = re.compile(
     r"lengths?|(n|num)_?(frames|steps|samples)|(episode|traj|trajectory|sequence)_(len|lengths?)"
 )
 OUTCOME = re.compile(r"(.*[^a-z])?(outcomes?|landings?|landed)([^a-z].*)?", re.IGNORECASE)
-"""What an array of where objects landed is called."""
+"""Names of arrays of outcomes."""
 JOINT_WORDS = r"(joint|angle|angular|position|motion|rotation|q)s?"
 _UNIT = re.compile(rf"(.*\.)?(({JOINT_WORDS}_?)*units?|units?\.({JOINT_WORDS}_?)+)", re.IGNORECASE)
-"""What the joints' units are called among others, deep in what a file says of itself."""
+"""Path of the joints' units, deep in a file's metadata."""
 _IN_UNITS = re.compile(r"(^|[._])units?\.[^.]+$", re.IGNORECASE)
-"""Where a channel's own unit stands among those of all, `meta.units.elbow`."""
+"""Path of a channel's own unit: `meta.units.elbow`."""
 _SOUND, _FASTER = 1_000_000, 20
-"""Numbers of what moves at another rate than the motion, at most, and how many times the motion's,
-if that is more. Ours: sound has more."""
+"""Size of an array with a sample rate of its own at most, or so many times the motion's. Ours:
+sound has more."""
 _FAR_OFF, _SLACK = 5.0, 0.01
-"""Standard deviations by which the middle of a motion is off what is said of its mean, and rounding
-of what is said. Ours: a motion is one of those of which it is said."""
+"""Standard deviations by which a motion may be off the stated mean, and rounding of that. Ours."""
 _ACTIONS = re.compile(r"(^|[^a-z])actions?$", re.I)
-"""Names of commands that a controller may scale."""
+"""Names of actions, which a controller may scale."""
 _STATES = re.compile(r"(^|[^a-z])(q|q?pos(itions?)?|(joint_?)?states?|joints?|obs\w*)$", re.I)
-"""Names of measured joints; an array of as many columns may also be a force."""
+"""Names of measured joints."""
 _ROUNDING = 1e-6
 """Rounding of single precision near 1."""
 _VALID = re.compile(
@@ -85,7 +84,7 @@ _SUCCESS = re.compile(
 """Flags of an episode that went well, or did not; `next.success` is LeRobot's."""
 _TRUE, _FALSE = {"true", "yes", "1", "1.0"}, {"false", "no", "0", "0.0"}
 _STEMS = re.compile("[/.]")
-"""What parts an array's own name from where it is: `observations/q`, `stats.q_mean`."""
+"""Separators in an array's path: `observations/q`, `stats.q_mean`."""
 
 
 def by_field(
@@ -106,11 +105,10 @@ def motion_keys(
     *,
     most: int = 2,
 ) -> tuple[str, ...]:
-    """Return which arrays are the motion: as given, the first usual one, a joint's, or the only.
+    """Return the arrays of the motion: the user's, the first `usual` one, the joints', or the only.
 
-    `arrays` have a shape and a dtype, and `most` dimensions the motion may have, (T, D) or
-    (N, T, D); what is asked for by name may be of one joint, (T,). FileFormatError lists those that
-    may be it where one is missing, or holds no numbers of such a shape.
+    The motion has up to `most` dimensions, (T, D) or (N, T, D); an array of one joint has (T,).
+    FileFormatError lists arrays that may be it if none is, or one has another shape or no numbers.
     """
     shapes = {name: own.shape for name, own in arrays.items() if own.dtype.kind in "fiu"}
     single = [name for name, shape in shapes.items() if len(shape) == 1]
@@ -137,7 +135,7 @@ def motion_keys(
 
 
 def worth_reading(shapes: Mapping[str, Sequence[int]], keys: Sequence[str]) -> Iterator[str]:
-    """Which arrays are the motion, may move beside it, tell its times, or mark what is padding."""
+    """Yield the arrays of the motion, those that may move beside it, its times, and masks."""
     count, most = shapes[keys[0]][0], max(_SOUND, _FASTER * math.prod(shapes[keys[0]]))
     for name, shape in shapes.items():
         size = math.prod(shape)
@@ -161,8 +159,8 @@ def recorded_among(
 ) -> Recording:
     """Return the recording whose motion is the arrays `keys`, (T,) or (T, D), side by side.
 
-    `arrays` are all that may say something of it, `texts` what the file says in words, `stated`
-    further numbers, such as a rate. `names` are those of the columns, if they are known.
+    `arrays` are all of the episode, `texts` and `stated` the file's texts and further numbers, such
+    as a rate. `names` are those of the columns, if they are known.
     """
     refuse_rates(f"{where}: {episode}", keys, options.joints or ())
     count = len(arrays[keys[0]])
@@ -199,7 +197,7 @@ def recorded_among(
 
 
 def refuse_rates(where: str, keys: Sequence[str], joints: Sequence[str]) -> None:
-    """FileFormatError if joints are to be what a key calls velocities, torques or the like."""
+    """Refuse to take as joints what a key calls velocities, torques or the like."""
     if Kind.ANGLE not in kinds(joints) or any(map(says_no_position, joints)):
         return
     for key in keys:
@@ -215,10 +213,7 @@ def refuse_rates(where: str, keys: Sequence[str], joints: Sequence[str]) -> None
 def _refuse_normalised(
     where: str, positions: np.ndarray, stated: Mapping[str, Any], keys: Sequence[str]
 ) -> None:
-    """FileFormatError if the motion is far from what the file says of its mean or its range.
-
-    `mean` and `q_mean` are of a motion `q`; `dq_mean` is of others.
-    """
+    """Refuse a motion `q` that is far from the `mean` or `q_mean`, or the range, in its file."""
     own = {"", *(_STEMS.split(key.lower())[-1] for key in keys)}
     for words in (("mean", "std"), ("min", "max")):
         said = [
@@ -246,10 +241,7 @@ def _refuse_normalised(
 
 
 def _refuse_scaled(where: str, positions: Positions, arrays: Arrays, keys: Sequence[str]) -> None:
-    """FileFormatError if actions are scaled commands or increments, between -1 and 1.
-
-    So if they reach an end exactly, or do not follow measured joints of as many columns.
-    """
+    """Refuse actions within -1 and 1 that are scaled: they reach an end, or no joints follow."""
     most = np.nanmax(np.abs(positions), initial=0.0)
     if not any(_ACTIONS.search(key) for key in keys) or most > 1 + _ROUNDING:
         return
@@ -267,7 +259,7 @@ def _refuse_scaled(where: str, positions: Positions, arrays: Arrays, keys: Seque
 def _other_names(
     episode: str, texts: Texts, count: int, joints: Sequence[str]
 ) -> Iterator[Ambiguity]:
-    """Ask about texts that hold wanted joints and are not as many as the columns."""
+    """Ask about names that hold wanted joints, but are not as many as the columns."""
     for key, own in texts.items():
         missing = missing_channels(joints, own)
         if len(missing) < len(joints) and tuple(joints)[: len(own)] != own:
@@ -281,9 +273,9 @@ def _other_names(
 def _joined(
     where: Path, keys: Sequence[str], arrays: Arrays, texts: Texts, joints: Sequence[str] | None
 ) -> tuple[Positions, tuple[str, ...]]:
-    """Put arrays (T,) and (T, D) of the same frames side by side, with the names of the columns.
+    """Put arrays (T,) and (T, D) of the same frames side by side, and name their columns.
 
-    Names are of all columns, or of the first array's; without any, several keys name the columns.
+    The file names all of them, or those of the first array; else the keys do.
     """
     columns = [arrays[key] if arrays[key].ndim > 1 else arrays[key][:, None] for key in keys]
     if len({len(column) for column in columns}) > 1:
@@ -306,9 +298,9 @@ def _joined(
 
 
 def _coordinates(key: str, widths: Sequence[int]) -> list[str]:
-    """Names of the three numbers of a place, `tcp_x`, or a pose's; none where they may be joints.
+    """Return names for the numbers of a place, `tcp_x`, or of a pose; none if they may be joints.
 
-    What is only called positions is a place beside the four numbers of an attitude.
+    An array called only `positions` is a place beside the four numbers of an attitude.
     """
     names = [f"{key}_{one}" for one in ("xyz" if widths[0] == 3 else range(widths[0]))]
     bare = key.rpartition("/")[2].lower() in ("p", "pos", "position", "positions")
@@ -319,10 +311,9 @@ def _coordinates(key: str, widths: Sequence[int]) -> list[str]:
 def names_said(
     where: object, texts: Texts, count: int, joints: Sequence[str] | None = None
 ) -> tuple[str, ...]:
-    """Return the names that a file's texts give to so many columns; none if none fit.
+    """Return the names of so many columns among a file's texts; none if there are none.
 
-    Texts that hold a wanted joint are names, whatever they are called; others if they are called
-    so. FileFormatError where two contradict each other.
+    They hold a wanted joint, or are called names. FileFormatError if two contradict each other.
     """
     wanted = tuple(joints or ())
     fit = {
@@ -343,7 +334,7 @@ def names_said(
 
 
 def units_said(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
-    """Return the unit of each column as texts state it; a single one for all that can be in it."""
+    """Return the stated unit of each column; a single one holds for all that can be in it."""
     by_name = {key.rpartition(".")[2]: own for key, own in texts.items() if _IN_UNITS.search(key)}
     if {*names} & by_name.keys():  # {"units": {"elbow": "deg", ...}}
         texts = {"units": tuple(by_name.get(name, ("",))[0] for name in names)}
@@ -361,16 +352,16 @@ def units_said(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
 
 
 def says_valid(name: str) -> bool:
-    """Whether a flag is by its name 0 in frames that were not measured: `is_valid`, `tracked`."""
+    """Whether a flag's name says that 0 marks frames without a measurement: `is_valid`."""
     return _VALID.fullmatch(name.lower()) is not None
 
 
 def without_invalid(
     episode: str, positions: Positions, flags: Arrays
 ) -> tuple[Positions, tuple[str, ...]]:
-    """Return a motion (T, D) that is nan where a flag (T,) says it was not measured, and remarks.
+    """Set a motion (T, D) to nan where a flag (T,) says it was not measured; return remarks too.
 
-    InvalidDemonstrationsError if that is so in more frames than may be lost.
+    InvalidDemonstrationsError if these are more frames than may be lost.
     """
     positions, remarks = positions.copy(), []
     for name, flag in flags.items():
@@ -388,12 +379,12 @@ def without_invalid(
 
 
 def says_success(name: str) -> bool:
-    """Whether a flag says by its name how an episode went: `is_success`, `failed`."""
+    """Whether a flag's name says how an episode went: `is_success`, `failed`."""
     return _SUCCESS.fullmatch(_STEMS.split(name)[-1]) is not None
 
 
 def failures(said: Mapping[str, Any]) -> Iterator[str]:
-    """Remark on flags of a whole episode, or of each frame, by which it failed."""
+    """Remark on flags, of the episode or of each frame, that call it failed."""
     for name, value in said.items():
         called = _SUCCESS.fullmatch(_STEMS.split(name)[-1])
         own = {str(one).lower() for one in np.ravel(value).tolist()} if called else set()
@@ -415,10 +406,10 @@ def other_count(where: str, declared: str, key: str, count: int) -> FileFormatEr
 def frames_said(
     where: str, key: str, stated: Mapping[str, Any], count: int
 ) -> tuple[int, tuple[str, ...]]:
-    """Return how many of the frames were recorded, the rest being padding, and a remark on it.
+    """Return how many frames are no padding, and a remark.
 
-    A number of frames says so, a mask that is one thing for the first frames and another for the
-    rest, or a motion of nan from there on. FileFormatError where frames beyond that number move.
+    A stated number of frames tells it, a mask, or a motion of nan at the end. FileFormatError if
+    frames beyond the stated number move.
     """
     found, kept = "", count
     for name, value in stated.items():

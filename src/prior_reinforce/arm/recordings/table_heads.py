@@ -1,4 +1,4 @@
-"""What the columns of a table are called: by its first lines, comments, or a JSON beside it."""
+"""Headers of a table's columns: from its first lines, its comments, or a JSON sidecar."""
 
 from __future__ import annotations
 
@@ -33,21 +33,21 @@ _UNIT_OF_ALL = re.compile(
     r"(?P<units>(?:[a-z]+|°)(?:\s*[,;]\s*(?:[a-z]+|°))*)\s*(?:[\])](?!\s*[:=])|$|[,;.](?!\d))",
     re.IGNORECASE,
 )
-"""A part of a comment that is the unit of all and of nothing else: `# joint angles in deg`, `# t in
-s, q in deg`, `# deg`; no `camera angles in deg`, and no `angle [deg]: 30`."""
+"""The unit of all columns in a comment: `# joint angles in deg`, `# t in s, q in deg`, `# deg`; not
+`camera angles in deg`, nor `angle [deg]: 30`."""
 _OF_RECORDINGS = re.compile(
     r"((meta|data|info|set|records?|recordings?|columns?|channels?|joints?|angles?|names?|units?|log"
     r"|throws?|demos?|demonstrations?|episodes?|trials?|session|motions?|robot|arm|csv|tables?|header"
     r"|schema|fields?|experiment)[ _-]?)+",
     re.IGNORECASE,
 )
-"""Names of a JSON file that describes all recordings of a folder; no `camera_info.json`."""
+"""Names of a sidecar that describes all recordings of a folder; not `camera_info.json`."""
 _OF_JOINTS = re.compile(r"(^|[._])joint_?(names?|units?)$", re.IGNORECASE)
-"""Keys of a JSON file that describes joints, whatever its name: `joint_names`."""
+"""Keys of a sidecar that describes joints, whatever its file is called: `joint_names`."""
 _COMMENT = re.compile(r"[#%/;\s]*(\w[\w .]*?)\s*[:=]\s*(\w+)\W*")
 """A comment with one value: `# success: false`."""
 _MOST_SAID = 1_000_000
-"""Bytes of a JSON beside a table at most. Ours: it says what the columns are."""
+"""Largest sidecar, in bytes. Ours: it describes columns."""
 
 
 class Sidecar(NamedTuple):
@@ -60,10 +60,10 @@ class Sidecar(NamedTuple):
 
 
 def read_sidecar(table: Table, joints: Sequence[str] | None = None) -> Sidecar:
-    """Read the JSON file that describes a table; an empty one if there is none.
+    """Read a table's sidecar, the JSON file that describes it; an empty one if there is none.
 
-    It has the table's name; or it is the only JSON in the folder and either its name is one of
-    recordings, or it names columns of the table, or joints or their units.
+    It has the table's name; or it is the only JSON in the folder, and is called like recordings, or
+    names columns of the table, or joints or their units.
     """
     path = Path(table.where)
     own = path.with_suffix(".json")
@@ -80,10 +80,10 @@ def read_sidecar(table: Table, joints: Sequence[str] | None = None) -> Sidecar:
 
 
 def headed(table: Table, sidecar: Sidecar, joints: Sequence[str] | None = None) -> Table:
-    """Return a table with the heads and units that its comments, or its sidecar, state.
+    """Return a table with the headers and units that its comments or its sidecar state.
 
-    Names of all columns but the first are taken if that one rises, as times do. Heads of the
-    table's own count more, and a single unit for all is only one of angles.
+    Names for all columns but the first are taken if that one rises, as times do. The table's own
+    header counts more, and a single unit for all holds only for angles.
     """
     where, texts = sidecar.where, sidecar.texts
     names = table.names if table.named else names_said(where, texts, len(table.names), joints)
@@ -112,10 +112,7 @@ def headed(table: Table, sidecar: Sidecar, joints: Sequence[str] | None = None) 
 
 
 def failed(table: Table, sidecar: Sidecar, others: Collection[str]) -> Iterator[str]:
-    """Remark on flags in a table's comments or its sidecar by which its motion failed.
-
-    What the sidecar says under the name of another recording is of that one.
-    """
+    """Remark on flags of failure in a table's comments or its sidecar, but not of `others`."""
     found = filter(None, map(_COMMENT.fullmatch, table.comments))
     comments = {match[1]: match[2] for match in found}
     said = {**sidecar.texts, **sidecar.numbers}
@@ -124,14 +121,14 @@ def failed(table: Table, sidecar: Sidecar, others: Collection[str]) -> Iterator[
 
 
 def with_heads(table: Table) -> Table:
-    """Return a table under one line of names, wherever its own stand."""
+    """Return a table with one header line, wherever its names stand."""
     return _of_echo(_of_levels(table))
 
 
 def _of_levels(table: Table) -> Table:
-    """Join further lines of names, as pandas writes of columns of several levels: `elbow/position`.
+    """Join several header lines, as pandas writes for columns of several levels: `elbow/position`.
 
-    Such lines hold no number, date or `nan`, and the next one does. The last may say units.
+    They hold no number, date or `nan`, and the next line does. The last may hold units.
     """
     are_numbers = ~np.isnan(table.values)
     rows = int(np.argmax(are_numbers.any(axis=1))) if table.named and are_numbers.size else 0
@@ -147,10 +144,10 @@ def _of_levels(table: Table) -> Table:
 
 
 def _of_echo(table: Table) -> Table:
-    """Name what `ros2 topic echo --csv` writes of a JointState; return others as they are.
+    """Name the columns that `ros2 topic echo --csv` writes of a JointState; leave other tables.
 
-    A row is the stamp in s and ns, the frame's name (column 3, which is no column where it is
-    empty), the joints' names, and as many positions; then velocities and efforts, if there are any.
+    A row is the stamp in s and ns, the frame's name (column 3, no column if empty), the joints'
+    names, and as many positions, then perhaps velocities and efforts.
     """
     if table.named:
         return table

@@ -1,4 +1,4 @@
-"""The times of a table's rows: a column, two that are one time, or a rate in its comments."""
+"""The times of a table's rows: a column of time stamps, two that are one time, or a frame rate."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _SAYS = re.compile(
 )
 """`fps: 40`, `sample rate = 1 kHz`."""
 _OF_ANYTHING = re.compile(r"rate|period|freq(uency)?([ _]?hz)?", re.IGNORECASE)
-"""Names of columns that may be of a swing, or a flow, as well as of frames."""
+"""Names of rates that may be of a swing, or a flow, as well as of frames."""
 _SECONDS = re.compile(r"(?P<stem>.*?)(secs?|seconds|s)")
 _THOUSAND = re.compile(r"\d{1,3}([.,]\d{3})+")
 """`1.000` beside a decimal comma."""
@@ -59,7 +59,7 @@ def _declared(table: Table, options: ReadOptions) -> DeclaredRate | None:
 
 
 def with_whole_dates(table: Table) -> Table:
-    """Return a table whose columns of dates and of times of day are one: `09.03.2024 23:58:00`."""
+    """Join a column of dates and one of times of day: `09.03.2024 23:58:00`."""
     found = {name.lower(): i for i, name in enumerate(table.names) if table.named}
     called = _DATES, COLUMN_TIMES
     date, time = (next((found[n] for n in own if n in found), None) for own in called)
@@ -74,7 +74,7 @@ def with_whole_dates(table: Table) -> Table:
 
 
 def called_times(table: Table, options: ReadOptions) -> list[int]:
-    """The column that is given as the time; else those that are called like one."""
+    """Return the column that the user names as the time; else those named like one."""
     if options.time_column is not None:
         none = options.time_column == NO_COLUMN
         return [] if none else [named_column(table, options.time_column, "--time-column")]
@@ -84,7 +84,7 @@ def called_times(table: Table, options: ReadOptions) -> list[int]:
 
 
 def named_column(table: Table, name: str, option: str) -> int:
-    """A column by its name, with or without the unit in it, or by its number from 1."""
+    """Return a column by its name, with or without a unit, or by its number from 1."""
     bare = [split_unit(n, SECONDS)[0] for n in table.names]
     for one, names in product((name, f"column {name}"), (table.names, bare)):
         if one in names:
@@ -97,7 +97,7 @@ def named_column(table: Table, name: str, option: str) -> int:
 
 
 def time_columns(table: Table, options: ReadOptions, others: Sequence[int | None]) -> FoundTimes:
-    """The columns of times; whatever rises steadily, and is no joint, may be one."""
+    """Return the columns of time stamps; what rises steadily, and is no joint, may be one."""
     called = called_times(table, options)
     if options.time_column is not None:
         summed = any(is_periods(table.names[i], table.values[:, i]) for i in called)
@@ -118,7 +118,7 @@ def time_columns(table: Table, options: ReadOptions, others: Sequence[int | None
 
 
 def _columns(table: Table, chosen: Iterable[int]) -> dict[int, tuple[str, Column]]:
-    """Some columns, by name, as times."""
+    """Some columns with their names, as times."""
     return {i: (table.names[i] or f"column {i + 1}", table.stamps(i)) for i in chosen}
 
 
@@ -138,7 +138,7 @@ def _seconds_and_parts(table: Table) -> FoundTimes | None:
 
 
 def is_coarse_time(table: Table, column: int) -> bool:
-    """Whether a column is the time, or part of it, in whole seconds."""
+    """Whether a column holds whole seconds of the time."""
     if (pair := _seconds_and_parts(table)) is not None and column in pair.columns:
         return True
     dates = table.nanoseconds(column)
@@ -146,7 +146,7 @@ def is_coarse_time(table: Table, column: int) -> bool:
 
 
 def is_long_format(table: Table, column: int) -> bool:
-    """Whether a table has a row for each joint and time (long format), named by this column."""
+    """Whether a table in long format has a row for each joint, which this column names."""
     texts = {*table.cells[column]}
     if len(texts) < 2 or not table.is_text(column):
         return False
@@ -159,7 +159,7 @@ def is_long_format(table: Table, column: int) -> bool:
 
 
 def counts_rows(table: Table, column: int, times: Times) -> bool:
-    """Whether a column counts rows or tells the time, which no joint does."""
+    """Whether a column counts rows or is a clock, which no joint is."""
     if table.is_unnamed(column):
         return rises(table.stamps(column))
     long = len(table) >= FEWEST_COUNTS

@@ -1,8 +1,8 @@
-"""Tables as people export them: CSV of any dialect.
+"""Read tables as people export them: CSV of any dialect.
 
-Encoding, delimiter and decimal sign are inferred from its lines: the pair that makes most
-cells numbers, in rows of one width. (`csv.Sniffer` knows no decimal comma.) Of comment lines (`#`,
-`%`, `//`) only one right above the first row counts: `numpy.savetxt` names the columns there.
+Delimiter and decimal sign are the pair that makes most cells numbers, in rows of one width.
+(`csv.Sniffer` knows no decimal comma.) A comment (`#`, `%`, `//`) right above the first row may be
+the header, as `numpy.savetxt` writes it.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ _COMMENTS = ("#", "%", "//")
 _SAMPLE = 40
 """Lines from which a dialect is inferred."""
 _WESTERN = set("°µ²³äöüÄÖÜßàâçéèêëîïôùûñÀÉÈáíóúãõåæøÅÆØ")
-"""Non-ASCII characters in tables that a Western Excel saves in its own code page."""
+"""Non-ASCII characters in tables in the code page of a Western Excel."""
 _LIST = re.compile(r"\s*[\[({]\s*[-+.\deE]+([,\s]+[-+.\deE]+)+\s*[\])}]\s*")
 PLAIN = "write plain numbers, -0.6 for (0.6), 1000 for 1.000,0, 0.5 for '0.5 sec', [1, 2] for two"
-"""What to do about a column of numbers in other forms."""
+"""Remedy for a column of numbers in other forms."""
 _DATE = re.compile(r"\d{4}-\d\d-\d\d|\d{1,2}:\d\d|\d{1,2}[/.]\d{1,2}[/.]\d{4}")
 _THOUSANDS = re.compile(
     r"[+-]?\d{1,3}(?:(['’\u00a0\u202f])\d{3}(\1\d{3})*([.,]\d*)?|( \d{3})+[.,]\d+)"
@@ -108,7 +108,7 @@ class Table:
         return np.array(columns, dtype=float).reshape(len(self.names), len(self)).T
 
     def unlike(self, row: int, column: int, says: str) -> FileFormatError:
-        """Return what to raise of a cell: its line and text, and what that `says`."""
+        """Return the error to raise about a cell: its line and text, and what is wrong."""
         where, cell = f"{self.where}, line {self.lines[row]}", self.cells[column][row][:40]
         return FileFormatError(f"{where}: {self.names[column]} is {cell!r}{says}")
 
@@ -164,9 +164,9 @@ class Table:
 def read_table(
     path: Path, delimiter: str | None = None, decimal: str | None = None, head: Collection[str] = ()
 ) -> Table:
-    """Read a CSV; its delimiter (a name in `DELIMITERS` or itself) and decimal sign are inferred.
+    """Read a CSV; None infers its delimiter (a name in `DELIMITERS` or itself) and decimal sign.
 
-    The line of names has one of `head`, and rows above are titles. FileFormatError if it is none.
+    The header has one of the names `head`, and rows above are titles. FileFormatError if damaged.
     """
     with named_damage(path, "a table"):
         return _read_csv(path, DELIMITERS.get(delimiter or "", delimiter), decimal, head)
@@ -240,7 +240,7 @@ def _split(lines: Iterable[str], delimiter: str, *, strict: bool = False) -> Any
 
 
 def _dialect(lines: Sequence[str], delimiter: str | None, decimal: str | None) -> tuple[str, str]:
-    """Delimiter and decimal sign under which the lines are rows of one width and mostly numbers."""
+    """Infer the delimiter and decimal sign that make rows of one width, mostly of numbers."""
     body = lines[min(1, len(lines) - 1) :]
     if all(line.endswith((",", ";")) for line in body):  # of some rows, the last cell is empty
         body = [line.rstrip(";,") for line in body]
@@ -260,10 +260,7 @@ def _dialect(lines: Sequence[str], delimiter: str | None, decimal: str | None) -
 
 
 def _number(text: str, decimal: str = ".") -> float:
-    """The number that a text is; nan if it is none.
-
-    A point beside a decimal comma would separate thousands: no number, rather than another one.
-    """
+    """Return the number in a text; nan if it is none, or has a point beside a decimal comma."""
     if "_" in text or (decimal == "," and "." in text):
         return math.nan
     try:
@@ -277,9 +274,9 @@ def _number(text: str, decimal: str = ".") -> float:
 
 
 def _as_iso(text: str) -> str:
-    """A date or time of day with the year first, if there is one, and 24 hours; others as it is.
+    """Write a date or time of day with the year first, and 24 hours; others as they are.
 
-    The month comes first where there is AM or PM, or where the second number is no month.
+    The month comes first beside AM or PM, or where the second number is no month.
     """
     if (found := _OF_AN_OFFICE.fullmatch(text)) is None:
         return f"0:{text}" if _MINUTES.fullmatch(text) else text
@@ -294,7 +291,7 @@ def _as_iso(text: str) -> str:
 
 
 def _moment(text: str) -> int | None:
-    """A date as a number of [ns], in UTC unless it says otherwise; None if it is none."""
+    """Return a date in [ns], in UTC unless it has a time zone; None of others."""
     if (found := _MOMENT.fullmatch(text)) is None:
         return None
     year, month, day, *time, fraction, zone, more = (part or "00" for part in found.groups())
@@ -307,7 +304,7 @@ def _moment(text: str) -> int | None:
 
 
 def _span(text: str) -> int | None:
-    """A time of day, or since a start, as a number of [ns]; None if it is none."""
+    """Return a time of day, or since a start, in [ns]; None of others."""
     if (found := _SPAN.fullmatch(text)) is None:
         return None
     days, hours, minutes, seconds = (int(part or 0) for part in found.groups()[1:5])
@@ -316,7 +313,7 @@ def _span(text: str) -> int | None:
 
 
 def is_value(text: str) -> bool:
-    """Whether a cell is a date, a time of day, or says that there is no number; so no name."""
+    """Whether a cell is a date, a time of day, or stands for no number; so no name."""
     return _DATE.match(text) is not None or text.lower() in (*_NAN, *_NONE)
 
 
@@ -332,7 +329,7 @@ def _table(
     decimal: str = ".",
     title: Sequence[str] = (),
 ) -> Table:
-    """Names, units and cells of numbered rows; names may be the `title`, in a comment above."""
+    """Return a table of numbered rows; its header may be the `title`, a comment above."""
     above = [any(cell.lower() in head for cell in row) for _, row in rows[:_SAMPLE]]
     rows = _of_one_width(where, rows[above.index(True) if any(above) else 0 :])
     first = rows[0][1]
@@ -368,10 +365,9 @@ def _table(
 
 
 def _numbers_columns(where: str, first: list[str], body: list[list[str]], decimal: str) -> bool:
-    """Whether the first row numbers columns without names from 0, as pandas does.
+    """Whether the first row numbers the columns from 0, as pandas does, perhaps behind an index.
 
-    Its index may stand before them. In a frame, numbers below are as near as they ever are, and
-    some have no decimals. FileFormatError if it may be either.
+    A frame is near the next one, and has decimals. FileFormatError if it may be either.
     """
     start = first.index("0") if "0" in first else 0
     if len(body) < 3 or first[start:] != [str(i) for i in range(len(first) - start)]:
@@ -392,7 +388,7 @@ def _numbers_columns(where: str, first: list[str], body: list[list[str]], decima
 
 
 def _of_one_width(where: str, rows: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
-    """Rows as wide as the first; FileFormatError names one that holds more cells."""
+    """Return rows of one width; FileFormatError names one with more cells than names."""
     width, names = max(len(row) for _, row in rows), len(rows[0][1])
     full = [max((k for k, c in enumerate(row, 1) if c), default=0) for _, row in rows[:_SAMPLE]]
     head = full.index(max(full))
@@ -413,7 +409,7 @@ def _of_one_width(where: str, rows: list[tuple[int, list[str]]]) -> list[tuple[i
 
 
 def _without_lists(where: str, columns: list[_Column]) -> list[_Column]:
-    """Columns of lists, `[1.0, 2.0]` in a cell, as a column for each of their numbers."""
+    """Split columns of lists, `[1.0, 2.0]` in a cell, into columns of numbers."""
     parts: list[_Column] = []
     for name, unit, column in columns:
         if not (column and all(_LIST.fullmatch(cell) for cell in column)):
@@ -434,7 +430,7 @@ def _without_lists(where: str, columns: list[_Column]) -> list[_Column]:
 
 
 def are_units(cells: list[str], decimal: str) -> bool:
-    """Whether the cells of a row are units of its columns, some of them empty."""
+    """Whether a row holds units of the columns, some of them empty."""
     return (
         any(known_unit(cell) for cell in cells)
         and all(_SECOND_ROW_OF_UNITS.fullmatch(cell) for cell in cells)
@@ -443,7 +439,7 @@ def are_units(cells: list[str], decimal: str) -> bool:
 
 
 def _is_padding(name: str, column: Sequence[str]) -> bool:
-    """Whether a column is what a trailing delimiter leaves, or the running count of pandas."""
+    """Whether a column is left by a trailing delimiter, or the row index of pandas."""
     if _NO_NAME.fullmatch(name) or name == "index":
         return not any(column) or list(column) == [str(i) for i in range(len(column))]
     return not any(column) and name.startswith("column ")

@@ -1,6 +1,6 @@
-"""Takes that are not as the others: in their units, numbers or times, or in where they start or go.
+"""Find takes that differ from the others: in units, numbers, times, starts or ends.
 
-Nothing is converted by what another take states: what may be in another unit is asked about.
+A take that may be in another unit is asked about, never converted by what another take states.
 """
 
 from __future__ import annotations
@@ -33,11 +33,10 @@ _ALIKE = 1.5
 _FAR_APART = 20.0
 """Times apart from which two plausible units are two. Ours."""
 _STARTS_APART, _AGAINST = 2.0, 0.5
-"""Ranges of its motion by which a channel's starts in two groups of takes may lie apart, and that
-where the groups move in opposite directions. Ours: a zero that was moved, columns in another order,
-a gripper that counts the other way."""
+"""Ranges of motion by which starts in two groups of takes may differ, and the same if the groups
+move in opposite directions. Ours: a shifted zero, columns in another order, a reversed gripper."""
 _LEAST = {"rad": 0.1, "m": 0.02, "percent": 5.0}
-"""Range of a channel that moves, by its unit. Ours: what stands still may stand anywhere."""
+"""Least range of a moving channel, by its unit. Ours."""
 _WITHIN = 0.2
 """Part of the gap between two groups by which starts within one may differ. Ours."""
 _BACK = 0.1
@@ -63,12 +62,11 @@ _AS_FAST = 0.95
 def in_one_unit(
     recordings: Sequence[Recording], names: Sequence[str], given: Sequence[str | None]
 ) -> tuple[list[Recording], list[str | None], list[str], list[Ambiguity]]:
-    """Bring each channel into the unit that is given, else into that of the first file stating one.
+    """Bring each channel into the given unit, else into that of the first file stating one.
 
-    Returns the takes, each converted by what its own file states; the channels' units; a remark on
-    each channel that was in several; a doubt on each whose unit some files state and others do not.
-    ConfigurationError if a file states another unit than the one given; InvalidDemonstrationsError
-    if two files state units of which one cannot be converted.
+    Returns the converted takes, the channels' units, remarks on channels in several units, and
+    doubts about those of which only some files state a unit. ConfigurationError if a file states
+    another unit than the given one; InvalidDemonstrationsError if two units cannot be converted.
     """
     scale, stated = np.ones((len(recordings), len(names))), list[str | None]()
     remarks, doubts = list[str](), []
@@ -129,10 +127,7 @@ def _called(recordings: Sequence[Recording]) -> str:
 
 
 def odd_takes(beliefs: Sequence[Belief]) -> tuple[set[str], list[Ambiguity]]:
-    """Return takes that are in another unit than the others by their numbers, and why.
-
-    Angles are held together and lengths together, a gripper by itself.
-    """
+    """Return takes whose numbers, angles or lengths or a gripper's, look like another unit; why."""
     groups: list[tuple[str, list[Belief]]] = [
         (unit, [b for b in beliefs if b.kind is not Kind.TOOL and base_of(b.unit)[0] == unit])
         for unit in APART
@@ -165,10 +160,9 @@ def odd_takes(beliefs: Sequence[Belief]) -> tuple[set[str], list[Ambiguity]]:
 
 
 def apart_from_most(reach: Mapping[str, float], unit: str) -> tuple[str, ...]:
-    """Return the takes whose numbers are apart from most others' by as much as two units are.
+    """Return the takes whose largest number is as far from most others' as two units are.
 
-    `reach` is the largest number of each take: of angles in `rad`, of lengths in `m`, else of what
-    is a share where it is at most 1.
+    Numbers are angles in `rad`, lengths in `m`, or a gripper's without a unit.
     """
     middle = sorted(reach.values())[(len(reach) - 1) // 2]
     odd = []
@@ -184,9 +178,9 @@ def apart_from_most(reach: Mapping[str, float], unit: str) -> tuple[str, ...]:
 
 
 def doubts_of_times(recordings: Sequence[Recording]) -> list[Ambiguity]:
-    """What is only guessed of the times, one doubt for each option.
+    """Return what is only guessed of the times, one doubt for each option.
 
-    Where only some takes are in another unit, no option holds for all: the fewer are left out.
+    If only some takes are in another unit, no option holds for all: the fewer are to be left out.
     """
     found = {one.option: one for r in reversed(recordings) for one in r.ambiguities}
     for option, doubt in list(found.items()):
@@ -207,7 +201,7 @@ def doubts_of_times(recordings: Sequence[Recording]) -> list[Ambiguity]:
 
 
 def _without(what: str, episodes: Sequence[str]) -> Ambiguity:
-    """A doubt that leaving some takes out settles."""
+    """Return a doubt that is settled by leaving out some takes."""
     return Ambiguity(what, f"--leave-out {shlex.join(episodes)}", guessed=False)
 
 
@@ -223,7 +217,7 @@ def odd_starts(
     names: Sequence[str],
     units: Sequence[str],
 ) -> Iterator[str]:
-    """Say which takes start far from the others, as of another arm; `before` is one group."""
+    """Remark on takes that start far from the others; `before` are demonstrations in use."""
     motions, n = [*before, *motions], len(before)
     episodes = [*so_far(n), *episodes]
     if len(motions) < 2:
@@ -253,7 +247,7 @@ def odd_starts(
 
 
 def ways_back(recordings: Sequence[Recording], among: Collection[str] | None = None) -> str:
-    """Say what to do with motions, `among` some, that go back to where the one before began."""
+    """Advise to leave out motions, `among` some, that return to where the last one began."""
     back = list[str]()
     for before, motion in pairwise(recordings):
         alike = before.positions.shape[1] == motion.positions.shape[1]
@@ -275,7 +269,7 @@ def _goes_back(before: Recording, motion: Recording) -> bool:
 
 
 def all_return(plans: Plans) -> str:
-    """Say it if every motion ends where it began: each may hold a way back; else empty."""
+    """Remark if every motion ends where it began, as with a way back; else empty."""
     if not _is_at(plans[:, -1], plans[:, 0], np.ptp(plans, axis=1)):
         return ""
     return (
@@ -286,7 +280,7 @@ def all_return(plans: Plans) -> str:
 
 
 def several_throws(recording: Recording) -> tuple[Ambiguity, ...]:
-    """Ask where the only recording holds so many motions that it may be several throws."""
+    """Ask whether a recording of many motions is several throws."""
     count = len(at_rests(recording, _REST))
     what = (
         f"{recording.episode} holds {count} motions with rests of {_REST:g} s or more between: it "
@@ -298,10 +292,9 @@ def several_throws(recording: Recording) -> tuple[Ambiguity, ...]:
 def increments_unsaid(
     recordings: Sequence[Recording], keys: Sequence[str]
 ) -> tuple[Ambiguity, ...]:
-    """Ask where actions may be increments of a tool's pose: all but a gripper rest at 0.
+    """Ask whether actions are increments of a tool's pose: all but a gripper rest at 0.
 
-    `keys` are what the motion is called in its file; robomimic, LIBERO, ManiSkill and Open-X call
-    increments `actions` or `action`.
+    robomimic, LIBERO, ManiSkill and Open-X call increments `actions` or `action`.
     """
     names = recordings[0].columns
     told = {*zero_at_rest(names, recordings[0].units)}
@@ -329,10 +322,7 @@ def increments_unsaid(
 
 
 def pauses(recordings: Sequence[Recording]) -> Iterator[str]:
-    """Say it if every recording rests between motions, and does not end where it began.
-
-    Of an approach, a throw and a retreat, the fastest is the likely throw.
-    """
+    """Remark if every recording rests between motions, of which the fastest is likely the throw."""
     throws, others = list[str](), list[str]()
     for recording in recordings:
         q, units = recording.positions, [unit or "rad" for unit in recording.units]

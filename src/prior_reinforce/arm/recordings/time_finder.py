@@ -1,4 +1,4 @@
-"""Which columns of a table, or arrays of a file, are the times of its frames."""
+"""Find the time stamps among a table's columns, or a file's arrays."""
 
 from __future__ import annotations
 
@@ -23,53 +23,53 @@ Stamps = Shaped[np.ndarray, "..."]
 Columns = Mapping[Any, tuple[str, Stamps]]
 """Name and numbers of columns by their place in a table, or of arrays by their name."""
 FEWEST_COUNTS = 20
-"""Frames of which it can be said that something counts them. Ours."""
+"""Fewest frames by which a counter can be told. Ours."""
 COUNTER = re.compile(
     r"(^|[^a-z])(seq|frame|sample|index|idx|count|counter|tick|row|nr|step)s?($|[^a-z])"
 )
 """Names of columns that count frames."""
 LONGEST = 60.0
-"""Seconds that a throw, slide or swing is recorded for, at most. Ours, and wide on purpose."""
+"""Longest recording of a throw, slide or swing, in [s]. Ours, and wide on purpose."""
 _SHORTEST = 0.1
-"""And at least. Ours."""
+"""Shortest one, in [s]. Ours."""
 _SLOWEST, _FASTEST = 1.0, 1e4
-"""Frames a second beyond which a rate or a unit is doubted although somebody says it. Ours."""
+"""Frame rates in [Hz] beyond which a stated rate or unit is doubted. Ours."""
 ARRAY_TIMES = ("t", "time", "timestamp", "timestamps")
-"""Names of arrays that are the times; fewer than of columns, since arrays may be of anything."""
+"""Names of arrays of time stamps; fewer than of columns, since arrays may be of anything."""
 _WORDS = (*ARRAY_TIMES, "times", "stamp", "elapsed", "duration")
 COLUMN_TIMES = (
     *_WORDS, "elapsed_time", "datetime", "date", "zeit", "uhrzeit", "hora", "heure", "ora",
 )  # fmt: skip
-"""Names of a table's columns that are the times."""
+"""Names of columns of time stamps."""
 _SAYS_TIME = re.compile(
     rf"(^|[^a-z])({'|'.join(_WORDS)}|date|ts|epoch|clock|secs?|seconds?)($|[^a-z])"
     r"|[a-z]_?(time|stamp)(_?m?s|_?sec)?$|zeit|temps|tiempo|tempo|czas|sekund|secondes|segundos|врем"
     r"|时间|時間|時刻|时刻|시간",
     re.IGNORECASE,
 )
-"""Names that say a time among other words; whether it is that of the frames, the numbers tell."""
+"""Names that contain a word for time; the numbers tell whether it is that of the frames."""
 _PERIOD = re.compile(
     r"((control|sampl[a-z]*|frame)[ _]?)?(dt|period|time[ _]?step|delta[ _]?t(ime)?)"
     r"|sampl[a-z]*[ _]?(time|interval)"
 )
-"""What files call the time from one frame to the next."""
+"""Names of the sample period."""
 _TICKS = (6.3e17, 6.6e17)
 """Numbers that are .NET's ticks of 100 ns since the year 1, from 1997 to 2092."""
 _EPOCH = (1e9, 4.1e9)
 """Seconds since 1970, from 2001 to 2099, in which a clock that is set counts."""
 _PERIODS, SHIFT = 3.0, 0.1
-"""A clock was set if it goes on by more than so many periods, and by more than so long, in [s].
+"""A clock was set where it leaps by more than so many periods, and by more than so long, in [s].
 Ours: queues of messages hold them for some 10 ms."""
 _DETOUR, _MOVES = 0.01, 0.02
-"""Part of their ranges that channels go further, at least, in the order of a clock that was set
-back, and part of the largest range that a channel moves by, at least. Ours."""
+"""In the order of a clock that was set back, channels go further by at least this part of their
+ranges; only channels that move by at least this part of the largest range count. Ours."""
 _NEARLY, _ANY_SPEED = 1.25, 2.5
-"""Factors within which what rises must run as fast as a rate says, to be a clock: an array of any
-kind, and what steps as a sampler does. Ours."""
+"""Factors by which a clock may run faster or slower than the frame rate: an array that rises, and
+one that steps evenly. Ours."""
 _EVEN = 0.25
-"""Share of its step by which half the steps of a sampler differ at most. Ours: receivers jitter."""
+"""Part of the median step by which half of even steps differ at most. Ours: receivers jitter."""
 _FEW_COUNTS = 100
-"""Whole numbers with smaller steps count anything, cycles of a servo for instance. Ours."""
+"""Whole numbers with smaller steps may count anything, cycles of a servo for instance. Ours."""
 _SAME_CLOCK = 0.01
 """Share by which two clocks of a recording differ at most. Ours."""
 
@@ -92,28 +92,28 @@ class Clock:
 
 
 class FoundTimes(NamedTuple):
-    """Which columns are the times."""
+    """Columns of time stamps."""
 
     columns: tuple[Any, ...] = ()
     """None, one, or whole seconds and a part of a second."""
     held: tuple[Any, ...] = ()
-    """Columns that must agree with it."""
+    """Other clocks, which must agree with them."""
     unit: str | None = None
-    """Unit of the last column, where it is known by other columns or by its numbers."""
+    """Unit of the last column, where other columns or its numbers tell it."""
     summed: bool = False
-    """Whether the column holds the time since the frame before."""
+    """Whether the column holds sample periods, which are summed up."""
     guessed: tuple[Ambiguity, ...] = ()
 
 
 def find_times(
     where: object, columns: Columns, called: Collection[Any], *, no_motion: bool = False
 ) -> FoundTimes:
-    """Return the times among columns, by what their names and numbers say.
+    """Return the column of time stamps, by names and numbers.
 
-    The first counts of those that are `called` so for certain, or rise steadily and say that they
-    are a time; else of those that say so and rise, which is asked about, or fall; else periods,
-    which are summed. Where `no_motion` is among the columns, what steps as a sampler does is held
-    against it too. FileFormatError if columns of one name are times that differ.
+    It is the first that is `called` a time for certain, or named like one and rises steadily; else
+    the first named like one that rises anyhow, which is asked about, or falls; else sample periods.
+    Other clocks must agree with it; with `no_motion`, so must every column that steps evenly.
+    FileFormatError if two columns of one name differ.
     """
     times = [*called, *(i for i, each in columns.items() if tells_time(*each))]
     increasing = [
@@ -146,11 +146,11 @@ def find_times(
 def other_times(
     where: object, columns: Columns, rate: float | None, *, in_arrays: bool
 ) -> FoundTimes:
-    """Return what may be the times where no name says so: what rises steadily.
+    """Return what may be time stamps although no name says so: a column that rises steadily.
 
-    If a rate is known, that, or a count that skips frames, is held against it; else the first is
-    asked about. Of `in_arrays`, which may hold anything, exactly one must rise that is called no
-    counter, and beside a rate run nearly as fast.
+    With a known rate, that column or a frame counter must agree with it; else the user is asked.
+    Arrays may hold anything: exactly one must rise, not be named a counter, and run nearly at the
+    rate.
     """
     rising = [i for i, (_, own) in columns.items() if rises(own)]
     if rate is not None or in_arrays:  # what counts frames one by one, or few, says nothing
@@ -186,23 +186,23 @@ def _refuse_several(where: object, times: Sequence[tuple[str, Stamps]]) -> None:
 
 
 def is_frame_rate(hertz: float) -> bool:
-    """Whether an arm may be recorded at so many frames a second."""
+    """Whether a frame rate is plausible."""
     return _SLOWEST <= hertz <= _FASTEST
 
 
 def is_throw(seconds: float) -> bool:
-    """Whether a recording may last so long."""
+    """Whether a duration is plausible for a throw."""
     return _SHORTEST <= seconds <= LONGEST
 
 
 def says_time(name: str) -> bool:
-    """Whether a column's name says, in some language, that it is a time."""
+    """Whether a name contains a word for time, in some language."""
     spaced = re.sub("(?<=[a-z])(?=[A-Z])", "_", name)
     return _SAYS_TIME.search(spaced) is not None
 
 
 def is_counter(name: str, values: Stamps) -> bool:
-    """Whether a column of whole numbers says that it counts frames; ticks are mostly of a clock."""
+    """Whether whole numbers are named a frame counter; ticks are mostly of a clock."""
     said = COUNTER.search(name.lower())
     return (
         said is not None
@@ -213,42 +213,42 @@ def is_counter(name: str, values: Stamps) -> bool:
 
 
 def says_period(name: str) -> bool:
-    """Whether a name says that it is the time from one frame to the next: `dt`, `period_ms`."""
+    """Whether a name is that of a sample period: `dt`, `period_ms`."""
     return _PERIOD.fullmatch(split_unit(name, SECONDS)[0].strip().lower()) is not None
 
 
 def is_periods(name: str, values: Stamps) -> bool:
-    """Whether a column holds the time since the frame before, and not the time itself."""
+    """Whether a column holds sample periods, and not the time itself."""
     steps = values[1:].astype(float)
     return says_period(name) and len(steps) > 0 and bool(np.all(steps > 0)) and not rises(values)
 
 
 def rises(values: Stamps) -> bool:
-    """Whether a column rises steadily, as times and counters do and no joint does."""
+    """Whether a column rises steadily, as clocks and counters do and no joint does."""
     steps = np.diff(values.astype(float))
     return bool(len(steps) > 1 and np.all(steps > 0) and steps.max() < 10 * np.median(steps))
 
 
 def tells_time(name: str, values: Stamps) -> bool:
-    """Whether a column rises steadily, and its name, its unit or its numbers say it is a time."""
+    """Whether a column rises steadily, and its name, unit or numbers are those of a time."""
     said = says_time(name) or split_unit(name, SECONDS)[1] is not None
     return (said or are_ticks(values) or epoch_unit(values) is not None) and rises(values)
 
 
 def counts_down(name: str, values: Stamps) -> bool:
-    """Whether a column called a time falls steadily: `time_to_release`."""
+    """Whether a column named like a time falls steadily: `time_to_release`."""
     return says_time(name) and rises(-values.astype(float))
 
 
 def _rate_of(stamps: Stamps) -> float:
-    """Frames in the unit of their times; nan where these stand still."""
+    """Frame rate, per unit of the time stamps; nan where these stand still."""
     steps = np.abs(np.diff(stamps.astype(float).ravel()))
     step = float(np.median(steps)) if steps.size else 0.0
     return 1 / step if step > 0 else np.nan
 
 
 def _runs_at(rate: float, stamps: Stamps, factor: float) -> bool:
-    """Whether a column rises, in s, ms, us or ns, as fast as frames come at a rate, or nearly."""
+    """Whether time stamps in s, ms, us or ns run at a frame rate, within a factor."""
     faster = rate / _rate_of(stamps)
     if not faster > 0:
         return False
@@ -257,17 +257,17 @@ def _runs_at(rate: float, stamps: Stamps, factor: float) -> bool:
 
 
 def _may_be_clock(rate: float | None, name: str, stamps: Stamps) -> bool:
-    """Whether an array that rises may be a clock, of frames at a rate if one is known."""
+    """Whether an array that rises may be a clock, which runs at the rate if that is known."""
     if rate is not None and _samples(rate, stamps):
         return True
     return not COUNTER.search(name.lower()) and (rate is None or _runs_at(rate, stamps, _NEARLY))
 
 
 def _samples(rate: float, stamps: Stamps) -> bool:
-    """Whether a column of any name steps as the clock of a sampler does, of frames at a rate.
+    """Whether a column of any name steps evenly, at about the frame rate.
 
-    It steps evenly. Numbers that count from long before the recording, as since a machine was
-    started, are surely a clock, and are held against the rate however far they are from it.
+    Numbers that begin long before the recording, as since a machine was started, are surely a
+    clock: of these the rate may be another.
     """
     numbers = stamps.astype(float)
     steps = np.diff(numbers, axis=0)
@@ -282,7 +282,7 @@ def _samples(rate: float, stamps: Stamps) -> bool:
 
 
 def epoch_unit(values: Stamps) -> str | None:
-    """Return the unit, s, ms, us or ns, in which numbers are times since 1970; None if in none."""
+    """Return the unit, s, ms, us or ns, in which numbers are dates since 1970; None if in none."""
     if not values.size:
         return None
     ends = np.array([values.min(), values.max()], dtype=float)
@@ -302,7 +302,7 @@ def skips_frames(values: Stamps) -> bool:
 
 
 def are_ticks(values: Stamps) -> bool:
-    """Whether they are ticks by their size, and as nanoseconds since 2000 no recording."""
+    """Whether numbers are as large as .NET's ticks, and make no recording in nanoseconds."""
     if values.size < 2 or values.min() < _TICKS[0] or values.max() > _TICKS[1]:
         return False
     length = 1e-9 * float(values.max() - values.min())
@@ -310,7 +310,7 @@ def are_ticks(values: Stamps) -> bool:
 
 
 def is_set_on(shift: Times, period: float) -> np.ndarray:
-    """Whether a clock was set, wherever it goes on by so much more than its period, in [s]."""
+    """Where a clock was set: it leaps by more than its period by so much, in [s]."""
     return shift > max(SHIFT, _PERIODS * period)
 
 

@@ -1,7 +1,6 @@
-"""Trajectory messages of ROS: via points, with the motion that a controller makes of them.
+"""Trajectory messages of ROS: via points, joined as ros2_control joins them.
 
-ros2_control's joint_trajectory_controller joins via points by cubics where they state velocities,
-by quintics where accelerations too, else by straight lines.
+It takes cubics through stated velocities, quintics through accelerations too, else straight lines.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
-"""Bring recordings whose numbers are a turn, or a sign, apart together (`plans.whole_turns`).
+"""Align recordings of one pose whose numbers differ by whole turns or signs (`plans.whole_turns`).
 
-Within an episode, an angle that passes the end of its recorder's range is continued. Across
-episodes, starts are brought as near to each other as whole turns can, within the robot's limits.
-What cannot be decided is refused.
+Within an episode, an angle that wraps at the end of its range is continued. Across episodes, whole
+turns bring starts together, within the robot's limits; what cannot be decided is refused.
 """
 
 from __future__ import annotations
@@ -41,8 +40,8 @@ Channel = Float[np.ndarray, " T"]
 Spans = Float[np.ndarray, "N 3"]
 """First, lowest and highest value of an angle in each of N episodes."""
 _NEXT = 0.3
-"""Of a step across the end of a range, what is left without the turn, in [rad], beside what the
-frames around it step. Ours: an encoder's noise, and one lost frame at 10 rad/s and 30 Hz."""
+"""Step across the end of a range, without the turn, beyond the steps around it, in [rad]. Ours: an
+encoder's noise, and one lost frame at 10 rad/s and 30 Hz."""
 _NORM = 0.05
 """By which the four numbers of a quaternion may miss length 1."""
 _SAME = 1e-3
@@ -69,11 +68,10 @@ _Apart = Callable[[np.ndarray, np.ndarray], np.ndarray]
 def aligned(
     selection: Selection, limits: RobotLimits | None, before: Demonstrations | None = None
 ) -> tuple[Selection, PlanFormat]:
-    """Return the recordings brought together, and what their channels mean; `dt` is 1 s.
+    """Return the aligned recordings, and the meaning of their channels; `dt` is 1 s.
 
-    The robot's joints keep to its limits, where they are known, and the recordings to the turns and
-    signs of demonstrations that were there `before`, which stay as they are.
-    InvalidDemonstrationsError if it cannot be told which way round a joint went.
+    Joints keep to the robot's limits, and recordings to the turns and signs of demonstrations in
+    use `before`. InvalidDemonstrationsError if it cannot be told which way round a joint went.
     """
     shown = () if before is None else before.plans
     episodes = [*so_far(len(shown)), *selection.episodes]
@@ -150,7 +148,7 @@ def _consecutive(
     taken: set[str],
     are: Callable[[Sequence[np.ndarray], set[str]], bool],
 ) -> list[tuple[str, ...]]:
-    """Channels side by side, `pose_3` to `pose_6`, that `are` one attitude; none `taken` before.
+    """Return adjacent channels, `pose_3` to `pose_6`, that `are` one attitude and not yet `taken`.
 
     The last first, as an attitude stands behind its place.
     """
@@ -193,10 +191,7 @@ def _take_two_forms(motions: Sequence[np.ndarray], units: set[str]) -> bool:
 
 
 def _are_two_forms(vectors: np.ndarray, others: np.ndarray) -> bool:
-    """Whether some vectors are near others only in their other form, and the rest as they are.
-
-    Angles of their own, which lie apart though they are turned, are none.
-    """
+    """Whether some rotation vectors are near others only in their other form, the rest as is."""
     off, other = vectors - others, other_form(vectors) - others
     turned = off - TURN["rad"] * np.round(off / TURN["rad"])
     near, far, turned = (np.linalg.norm(each, axis=1) for each in (off, other, turned))
@@ -225,7 +220,7 @@ class _InForms(NamedTuple):
     far: float
     """How far it starts from the first motion, as it is and in the other form."""
     leaps: float
-    """What is left of its steps from frame to frame, and from the first motion's start: a sum."""
+    """Sum of its steps from frame to frame, and of that from the first motion's start."""
 
 
 def _in_forms(
@@ -293,9 +288,9 @@ class _Together:
             yield f"no joint goes below 0, as where angles count from 0 to 360 deg: {what}"
 
     def take_forms(self, group: Sequence[str], turn: float = 0.0) -> Iterator[str]:
-        """Take the form of an attitude that is nearest to the frame, and to the episode, before.
+        """Write an attitude in the form nearest to the frame before, and to the first episode.
 
-        `turn` is a whole turn of Euler angles; 0 is of quaternions and rotation vectors.
+        `turn` is a whole turn of Euler angles; 0 of quaternions and rotation vectors.
         """
         columns, what = [self.form.names.index(name) for name in group], ", ".join(group)
         others: Sequence[_Form] = [other_form]
@@ -335,9 +330,8 @@ class _Together:
     def take_turns(self, channel: int, *, known: bool, circle: bool) -> Iterator[str]:
         """Continue an angle across the end of its range, and start all episodes in one turn.
 
-        What is not `known` to be an angle is one where it passes the end of a range smoothly. What
-        is no `circle` may have stops, and another turn of it be no pose: it stays in its turn,
-        unless the starts are over a turn apart, as counted turns are.
+        A channel that is not `known` to be an angle is one if it wraps smoothly. One that is no
+        `circle` may have stops, so its turn is kept, unless starts are over a turn apart.
         """
         name, unit = self.form.names[channel], self.form.units[channel]
         limits = _range(name, self.limits)
@@ -387,9 +381,9 @@ def _range(name: str, limits: RobotLimits | None) -> tuple[float, float]:
 
 
 def _continued(values: Channel, turn: float, beside: float) -> Channel:
-    """An angle without whole turns within one frame; a switch that steps further stays.
+    """Return an angle without whole turns from frame to frame; a switch that steps further stays.
 
-    Without the turn, a step is at most `beside` more than what the frames around it step.
+    Without the turn, a step is at most `beside` more than the steps around it.
     """
     steps = np.diff(values)
     left = steps - turn * np.round(steps / turn)

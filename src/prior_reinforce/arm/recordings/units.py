@@ -46,11 +46,11 @@ _PLAUSIBLE: Mapping[str, Mapping[str, tuple[float, float]]] = {
     "opening in share": {"share": (0.0, 1.1), "percent": (2.0, UNITS["percent"].largest)},
     "period": {u: (1 / (_FASTEST * scale), 1 / (_SLOWEST * scale)) for u, scale in SECONDS.items()},
 }
-"""Units that angles, lengths and periods may be in, the likeliest first, with the least and the
-greatest number: of angles and lengths the largest one, of periods the time between two frames.
-Ours: no joint turns two turns, or faster than 15 rad/s; above 300, millimetres are likelier than an
-arm of three metres; no gripper opens by 30 cm, or only by 0.3 mm; one that stays within 1, or
-hardly beyond, is recorded as a share, but below 0.1 as well in metres, and to 2 in radians."""
+"""Plausible units, the likeliest first, with the least and the greatest number: of angles or
+lengths the largest, of periods the time between two frames. Ours: no joint turns two turns, or
+faster than 15 rad/s; above 300, millimetres are likelier than metres; no gripper opens by 30 cm, or
+only by 0.3 mm; one within about 1 is recorded as a share, but below 0.1 as well in metres, and to 2
+in radians."""
 _BRACKETS = re.compile(r"(?P<name>.+?)(?: in)?\s*[\[(]\s*(?P<unit>[^\[\]()]+?)\s*[\])]")
 _ENDING = re.compile(r"(?P<name>.+?)(?:[_ ]in)?[_ ](?P<unit>[a-zµμ°]+)")
 _CAMEL = re.compile(r"(?P<name>.*[a-z0-9])(?P<unit>[A-Z][a-z]+|DEG|RAD|MM|CM|MS|US|NS)")
@@ -83,10 +83,9 @@ class Ambiguity:
 def raise_if_ambiguous(
     ambiguities: Iterable[Ambiguity], also: str = "", *, take_guesses: bool = False
 ) -> None:
-    """Raise UnclearUnitsError if anything is ambiguous, with all options that settle it.
+    """Raise UnclearUnitsError with all ambiguities, their options, and `also` other problems.
 
-    `also` are other problems, so that all are reported at once. With `take_guesses`, only what
-    cannot be guessed is raised.
+    With `take_guesses`, only ambiguities that cannot be guessed are raised.
     """
     found = [one for one in dict.fromkeys(ambiguities) if not (take_guesses and one.guessed)]
     if found:
@@ -106,8 +105,8 @@ def split_unit(
 ) -> tuple[str, str | None]:
     """Split a column's name `x_cm`, `q0 [deg]` or `time (ms)` into the name and the unit in it.
 
-    `among` are units that may stand there, in brackets also behind a number, `(0.001deg)`; with
-    `any_word` so is any word in square brackets, `volume [ml]`. Without one, the name and None.
+    `among` are possible units, in brackets also behind a number, `(0.001deg)`; with `any_word`, so
+    is any word in square brackets, `volume [ml]`. Without a unit, the name and None.
     """
     for pattern in (_BRACKETS, _ENDING, _BEFORE_NUMBER, _CAMEL):
         match = pattern.fullmatch(column.strip())
@@ -153,10 +152,10 @@ def conversion(recorded: str, wanted: str, name: str) -> float:
 def judge_unit(
     unit: str, number: float, *, period: bool = False, opening: bool = False
 ) -> str | None:
-    """Return the unit that a number looks like: the same if that is plausible, None if none fits.
+    """Return the unit that a number looks like: the same if plausible, None if none fits.
 
-    The number is the largest absolute angle, length or share (other units are plausible all, and so
-    is 0), a gripper's `opening`, or a `period` between two frames in a unit of time.
+    The number is the largest angle, length or share, a gripper's `opening`, or the `period` between
+    two frames; 0 and other units are always plausible.
     """
     if number == 0 and not period:
         return unit

@@ -1,8 +1,7 @@
 """Diffusion Policy's replay buffers: zarr stores (format 2), as folders or zipped.
 
 Layout (real-stanford/diffusion_policy, common/replay_buffer.py): `data/<key>` holds all episodes
-one after the other, `meta/episode_ends` where each ends. It has no names, and times only where its
-writer adds `data/timestamp`, as UMI's does.
+one after the other, `meta/episode_ends` their ends. No names; times only in UMI's `data/timestamp`.
 """
 
 from __future__ import annotations
@@ -109,10 +108,10 @@ def _numbers(source: Path, group: Any, arrays: Arrays, name: str) -> Stamps:
 
 
 def _plain_arrays(source: Path) -> Arrays:
-    """Shapes and chunks of the arrays of plain numbers, by name, from their metadata alone.
+    """Return shapes and chunks of the arrays of plain numbers, by name, from metadata alone.
 
-    Arrays of objects, and codecs that make objects, could run code when they are read; they are
-    left out, and so are never opened. FileFormatError if a link leads out of the store.
+    Arrays of objects, and codecs that make objects, could run code when read, and are never opened.
+    FileFormatError if a link leads out of the store.
     """
     plain: dict[str, tuple[tuple[int, ...], tuple[int, ...]]] = {}
     for name, text in _metadata(source):
