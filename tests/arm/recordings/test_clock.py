@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from prior_reinforce.arm.recordings import clock
-from prior_reinforce.arm.recordings.clock import clock_among
+from prior_reinforce.arm.recordings.clock import clock_from_arrays
 from prior_reinforce.arm.recordings.options import ReadOptions
-from prior_reinforce.arm.recordings.rates import DeclaredRate, declared_rate
+from prior_reinforce.arm.recordings.time_finder import DeclaredRate, declared_rate
 from prior_reinforce.errors import (
     ConfigurationError,
     FileFormatError,
@@ -282,6 +282,10 @@ def test_a_given_rate_beside_a_period_in_an_unknown_unit_is_held_against_it():
 def test_the_rate_of_each_frame_is_none_of_the_file():
     rates = {"control_rate": np.array([999.0, 1000, 1001]), "t": np.arange(3) / 50}
     options = ReadOptions()
-    assert clock_among(Path("a.npz"), "a", 3, rates, options, rates).period == pytest.approx(0.02)
+    assert clock_from_arrays(Path("a.npz"), "a", 3, rates, options, rates).period == pytest.approx(
+        0.02
+    )
     same = {"fps": np.full(3, 50.0)}
-    assert clock_among(Path("a.npz"), "a", 3, same, options, same).period == pytest.approx(0.02)
+    assert clock_from_arrays(Path("a.npz"), "a", 3, same, options, same).period == pytest.approx(
+        0.02
+    )

@@ -10,7 +10,7 @@ from prior_reinforce.arm.recordings.naming import (
     joint_vectors,
     missing_channels,
     numbered_like,
-    said_in,
+    read_metadata,
     vectors,
     words,
 )
@@ -117,11 +117,11 @@ NAMES = ("elbow", "pan", "lift")
     ],
 )
 def test_names_are_found_in_what_a_file_says_however_deep(said, place):
-    assert said_in(said)[0][place] == NAMES
+    assert read_metadata(said)[0][place] == NAMES
 
 
 def test_numbers_are_found_and_what_cannot_be_parsed_is_none():
-    texts, numbers = said_in(
+    texts, numbers = read_metadata(
         {"meta": {"a": {"fps": 50}, "b": True}, "x": "{half", "y": "[" * 10**5}
     )
     assert numbers == {"meta.a.fps": 50, "meta.b": True}

@@ -8,11 +8,11 @@ import pytest
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.stated import (
     failures,
-    frames_said,
     motion_keys,
-    names_said,
-    recorded_among,
-    units_said,
+    recorded_frames,
+    recording_of_arrays,
+    stated_names,
+    stated_units,
     without_invalid,
 )
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError
@@ -34,13 +34,13 @@ from tests.arm.recordings.recorded import UR, Q
     ],
 )
 def test_texts_that_are_as_many_as_the_columns_are_their_names(texts, joints, found):
-    assert names_said("a.npz", texts, 3, joints) == found
+    assert stated_names("a.npz", texts, 3, joints) == found
 
 
 def test_texts_that_contradict_each_other_are_refused():
     texts = {"joint_names": UR, "dof_names": UR[::-1]}
     with pytest.raises(FileFormatError, match="joint_names says pan, lift, elbow; dof_names says"):
-        names_said("a.npz", texts, 3, UR)
+        stated_names("a.npz", texts, 3, UR)
 
 
 @pytest.mark.parametrize(
@@ -64,11 +64,11 @@ def test_texts_that_contradict_each_other_are_refused():
     ],
 )
 def test_units_in_words_are_of_the_columns(texts, units):
-    assert units_said(texts, ("pan", "lift", "gripper")) == units
+    assert stated_units(texts, ("pan", "lift", "gripper")) == units
 
 
 def test_an_angles_unit_in_words_is_not_of_places():
-    assert units_said({"unit": ("deg",)}, ("x", "y", "pan")) == (None, None, "deg")
+    assert stated_units({"unit": ("deg",)}, ("x", "y", "pan")) == (None, None, "deg")
 
 
 @pytest.mark.parametrize(
@@ -86,7 +86,7 @@ def test_an_angles_unit_in_words_is_not_of_places():
 )
 def test_a_number_of_frames_or_a_mask_says_what_is_padding(stated, kept):
     q = np.where(np.arange(101)[:, None] < 80, Q, 0.0)
-    found, said = frames_said("a", "q", {"q": q, **stated}, 101)
+    found, said = recorded_frames("a", "q", {"q": q, **stated}, 101)
     assert (found, len(said)) == (kept, int(kept < 101))
 
 
@@ -94,7 +94,7 @@ def test_a_number_of_frames_or_a_mask_says_what_is_padding(stated, kept):
 def test_frames_that_were_not_measured_by_a_flag_are_lost(called):
     flag = np.ones(101)
     flag[[0, 1, 50]] = 0
-    found = recorded_among(
+    found = recording_of_arrays(
         Path("a.npz"), "0", ("q",), {"q": Q, "t": np.arange(101) / 50, called: flag}, ReadOptions(),
         texts={}, names=UR,
     )  # fmt: skip
@@ -115,14 +115,14 @@ def test_nan_to_the_end_of_every_joint_is_padding_and_within_is_not():
     q = Q.copy()
     q[80:] = np.nan
     for one, kept in ((q, 80), (np.where(np.arange(101)[:, None] == 90, Q, q), 91)):
-        assert frames_said("a", "q", {"q": one}, 101)[0] == kept
+        assert recorded_frames("a", "q", {"q": one}, 101)[0] == kept
     q[80:, 0] = 0.1
-    assert frames_said("a", "q", {"q": q}, 101)[0] == 101
+    assert recorded_frames("a", "q", {"q": q}, 101)[0] == 101
 
 
 def test_frames_beyond_the_number_that_move_are_no_padding():
     with pytest.raises(FileFormatError, match="declares 40 samples by length but q holds 101"):
-        frames_said("a", "q", {"q": Q, "length": np.int64(40)}, 101)
+        recorded_frames("a", "q", {"q": Q, "length": np.int64(40)}, 101)
 
 
 @pytest.mark.parametrize(
@@ -153,10 +153,11 @@ def test_torques_that_are_named_as_the_motion_are_no_joints(key):
     for texts in ({}, {"joint_names": UR}):  # whether or not the file names its columns
         options = ReadOptions(key=(key,), joints=UR)
         with pytest.raises(FileFormatError, match=f"{key} looks like .*torques.*--key"):
-            recorded_among(Path("a.h5"), "a", (key,), arrays, options, texts=texts)
+            recording_of_arrays(Path("a.h5"), "a", (key,), arrays, options, texts=texts)
     plain = ReadOptions(key=(key,), joints=("tau1", "tau2", "tau3"))
     assert (
-        recorded_among(Path("a.h5"), "a", (key,), arrays, plain, texts={}).positions.shape[1] == 3
+        recording_of_arrays(Path("a.h5"), "a", (key,), arrays, plain, texts={}).positions.shape[1]
+        == 3
     )
 
 
@@ -166,7 +167,7 @@ def test_torques_beside_joints_are_none_and_positions_of_now_are(tmp_path):
 
     def read(*keys):
         options = ReadOptions(key=keys, joints=UR[: len(keys)] if len(keys) > 1 else UR)
-        return recorded_among(Path("a.h5"), "a", keys, arrays, options, texts={}).positions
+        return recording_of_arrays(Path("a.h5"), "a", keys, arrays, options, texts={}).positions
 
     with pytest.raises(FileFormatError, match=r"tau looks like .*torques"):
         read("q", "tau")
@@ -204,7 +205,7 @@ def test_an_only_array_that_is_called_an_outcome_is_named_as_what_may_be_the_mot
 def read_beside(motion, said, options=None):
     arrays = {"q": motion, "t": np.arange(len(motion)) / 50}
     options = options or ReadOptions()
-    return recorded_among(
+    return recording_of_arrays(
         Path("a.npz"), "0", ("q",), arrays, options, texts={}, stated=said, names=UR
     )
 
@@ -285,7 +286,7 @@ def test_actions_that_a_controller_scales_are_no_positions(key, actions, measure
 
     def read(**how):
         options = ReadOptions(rate=50, joints=UR, **how)
-        return recorded_among(Path("a.npz"), "a", [key], arrays, options, texts={})
+        return recording_of_arrays(Path("a.npz"), "a", [key], arrays, options, texts={})
 
     by_key = "--key states" if measured else "--key;"
     with pytest.raises(FileFormatError, match=rf"{by_key}.*--units rad"):
@@ -306,5 +307,5 @@ def test_actions_that_a_controller_scales_are_no_positions(key, actions, measure
 def test_actions_that_are_positions_are_read(scale, others):
     arrays = {"actions": scale * Q, **others}
     options = ReadOptions(rate=50, joints=UR)
-    read = recorded_among(Path("a.npz"), "a", ["actions"], arrays, options, texts={})
+    read = recording_of_arrays(Path("a.npz"), "a", ["actions"], arrays, options, texts={})
     np.testing.assert_array_equal(read.positions, scale * Q)

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from prior_reinforce.arm.recordings.table_heads import with_heads
+from prior_reinforce.arm.recordings.table_heads import with_one_header
 from prior_reinforce.arm.recordings.tables import read_table
 
 
 def headed(tmp_path, *lines):
     (tmp_path / "a.csv").write_text("\n".join(lines))
-    return with_heads(read_table(tmp_path / "a.csv"))
+    return with_one_header(read_table(tmp_path / "a.csv"))
 
 
 def test_the_last_of_several_lines_may_say_units(tmp_path):

@@ -10,8 +10,8 @@ from prior_reinforce.arm.recordings.recording import Recording
 from prior_reinforce.arm.recordings.selection import select
 from prior_reinforce.arm.recordings.takes import (
     all_return,
-    doubts_of_times,
-    increments_unsaid,
+    ambiguities_of_times,
+    ask_about_increments,
     odd_starts,
     pauses,
     ways_back,
@@ -76,10 +76,10 @@ def test_a_file_that_states_no_unit_where_others_do_is_asked_about():
 
 def test_takes_whose_times_are_in_another_unit_are_named_if_they_are_the_fewer():
     some = [replace_clock(take, i == 1) for i, take in enumerate(takes(ARM, RAD, RAD, RAD))]
-    (asked,) = doubts_of_times(some)
+    (asked,) = ambiguities_of_times(some)
     assert asked.what.startswith("t1: would take 1000 s, but t0, t2 would not be in that unit")
     assert (asked.option, asked.guessed) == ("--leave-out t1", False)
-    assert doubts_of_times(some[1:2]) == list(some[1].ambiguities)
+    assert ambiguities_of_times(some[1:2]) == list(some[1].ambiguities)
 
 
 def replace_clock(take, doubtful):
@@ -215,11 +215,11 @@ def test_actions_that_are_0_at_both_ends_may_be_increments(key, names, told):
     steps = np.diff(S, append=S[-1])[:, None] * np.linspace(1, 0.5, len(names))
     steps[:, 6:] = S[:, None] > 0.5
     some = [Recording(f"t{i}", np.arange(len(S)) / 20, steps, names) for i in range(2)]
-    asked = increments_unsaid(some, [key])
+    asked = ask_about_increments(some, [key])
     assert [one.option for one in asked] == [f"--joints {' '.join(names)}"] * told
     assert all("--action-names dx dy dz" in one.what for one in asked)
     poses = [Recording("t", np.arange(len(S)) / 20, S[:, None] * np.ones(3), ("x", "y", "z"))]
-    assert increments_unsaid(poses, [key]) == ()
+    assert ask_about_increments(poses, [key]) == ()
 
 
 @pytest.mark.parametrize(

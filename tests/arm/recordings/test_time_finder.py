@@ -5,13 +5,14 @@ import pytest
 
 from prior_reinforce.arm.recordings.time_finder import (
     counts_down,
+    declared_rate,
     find_times,
+    guess_times,
     is_clock,
     is_set_back,
     is_set_on,
-    other_times,
+    looks_like_time,
     skips_frames,
-    tells_time,
 )
 from prior_reinforce.arm.recordings.units import FRAME
 from prior_reinforce.errors import FileFormatError
@@ -56,7 +57,7 @@ def test_what_counts_down_falls_and_is_called_a_time():
 
 @pytest.mark.parametrize("rate", [200, 1000])
 def test_nanoseconds_since_2000_are_no_ticks(rate):
-    assert not tells_time("n", 641_000_000_000_000_000 + np.arange(rate) * (10**9 // rate))
+    assert not looks_like_time("n", 641_000_000_000_000_000 + np.arange(rate) * (10**9 // rate))
 
 
 @pytest.mark.parametrize(
@@ -89,23 +90,23 @@ def test_times_of_one_name_that_differ_are_refused():
 
 def test_what_rises_is_asked_about_or_held_against_a_rate():
     columns = places(q=np.sin(T), n=np.arange(101.0), up=1.5 * T, frame=SKIPS)
-    (doubt,) = other_times("a", places(q=np.sin(T), up=T), None, in_arrays=False).guessed
+    (doubt,) = guess_times("a", places(q=np.sin(T), up=T), None, in_arrays=False).guessed
     assert doubt.option == "--time-column up"
     assert not doubt.guessed
     for in_arrays in (True, False):
-        found = other_times("a", columns, 20.0, in_arrays=in_arrays)
+        found = guess_times("a", columns, 20.0, in_arrays=in_arrays)
         assert (found.columns, found.unit) == ((3,), FRAME)
     del columns[3]
-    assert other_times("a", columns, 20.0, in_arrays=False).columns == (2,)
+    assert guess_times("a", columns, 20.0, in_arrays=False).columns == (2,)
 
 
 def test_of_arrays_only_one_that_runs_as_the_rate_says_is_held_against_it():
     columns = places(q=np.sin(T), up=1.5 * T)
-    assert other_times("a", columns, 20.0, in_arrays=True).columns == ()
-    assert other_times("a", columns, 15.0, in_arrays=True).columns == (1,)
-    assert other_times("a", columns, None, in_arrays=True).columns == (1,)
-    assert other_times("a", places(up=T, down=2 * T), None, in_arrays=True).columns == ()
-    assert other_times("a", places(frame=2 * T), None, in_arrays=True).columns == ()
+    assert guess_times("a", columns, 20.0, in_arrays=True).columns == ()
+    assert guess_times("a", columns, 15.0, in_arrays=True).columns == (1,)
+    assert guess_times("a", columns, None, in_arrays=True).columns == (1,)
+    assert guess_times("a", places(up=T, down=2 * T), None, in_arrays=True).columns == ()
+    assert guess_times("a", places(frame=2 * T), None, in_arrays=True).columns == ()
 
 
 @pytest.mark.parametrize(
@@ -133,7 +134,7 @@ def test_a_clock_of_any_name_is_held_against_the_times(name, values, held):
 def test_a_clock_of_any_name_is_held_against_a_rate(faster):
     for origin, scale in ((50, 1), (5e12, 1e9)):
         columns = places(q=np.sin(T), perf_counter=origin + scale * faster * T)
-        assert other_times("a", columns, 20.0, in_arrays=True).columns == (1,)
+        assert guess_times("a", columns, 20.0, in_arrays=True).columns == (1,)
     assert find_times("a", places(unix=1.7e9 + faster * T), ()).columns == (0,)
 
 
@@ -162,3 +163,52 @@ def test_a_clock_was_set_back_where_its_order_is_a_longer_way(by, set_back):
 def test_a_clock_was_set_on_by_more_than_periods_and_jitter():
     assert is_set_on(np.array([0.05, 0.2, 2.0]), 0.01).tolist() == [False, True, True]
     assert is_set_on(np.array([0.05, 0.2, 2.0]), 0.1).tolist() == [False, False, True]
+
+
+def test_of_two_declared_rates_the_given_one_is_taken():
+    both = {"dt": 0.02, "fps": 30}
+    assert declared_rate("a", both, given=30.0) == (30, "fps")
+    assert declared_rate("a", both, given=50.0).name == "dt"
+
+
+@pytest.mark.parametrize(
+    ("said", "rate"),
+    [({"fps": 50}, 50), ({"dt_ms": 20, "Frame Rate": 50}, 50), ({"control_freq": 20}, 20),
+     ({"sampling_frequency": 125, "mass": 3}, 125), ({"time_step": 0.02}, 50), ({"hz": 30}, 30)],
+)  # fmt: skip
+def test_rates_that_files_declare(said, rate):
+    assert declared_rate("a", said) == (pytest.approx(rate), next(iter(said)))
+
+
+def test_declared_rates_that_contradict_each_other_or_are_none():
+    with pytest.raises(FileFormatError, match="dt says 50 frames a second, but fps 30; take one"):
+        declared_rate("a", {"dt": 0.02, "fps": 30})
+    assert declared_rate("a", {"mass": 3.0, "generate": 1, "update": 2}) is None
+
+
+@pytest.mark.parametrize(
+    ("stated", "given", "rate"),
+    [
+        ({"meta.fps": 50}, None, (50, "fps")),
+        ({"meta.frame_rate": 50}, None, (50, "frame_rate")),
+        ({"meta.timing.dt_ms": 20.0}, None, (50.0, "dt_ms")),
+        ({"sample_time_ms": 20.0}, None, (50.0, "sample_time_ms")),
+        ({"fps": 50, "cycle_time": 0.002}, None, (50, "fps")),
+        ({"meta.fps": 50, "rate": np.array(50.0)}, None, (50.0, "rate")),
+        ({"meta.fps": 50, "meta.camera.fps": 30}, None, (50, "fps")),
+        ({"meta.fps": 50, "meta.robot.hz": 100}, 50.0, (50, "fps")),
+        ({"meta.version": 2}, None, None),
+    ],
+)
+def test_a_rate_deep_in_what_a_file_says_is_its_rate(stated, given, rate):
+    assert declared_rate("a.npz", stated, given) == rate
+
+
+def test_two_rates_that_contradict_each_other_are_refused():
+    stated = {"meta.fps": 50, "meta.robot.dt": 0.01}
+    with pytest.raises(
+        FileFormatError, match=r"meta\.fps says 50 .*, but meta\.robot\.dt 100; .*-r"
+    ):
+        declared_rate("a.npz", stated)
+    with pytest.raises(FileFormatError, match=r"rate says 20 .*, but meta\.fps 50"):
+        declared_rate("a.npz", {"rate": np.array(20), "meta.fps": 50})

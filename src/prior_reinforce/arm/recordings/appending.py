@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.arm.recordings.selection import Selection
-from prior_reinforce.arm.recordings.takes import APART, so_far
+from prior_reinforce.arm.recordings.takes import APART, names_in_use
 from prior_reinforce.arrays import Plans
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.motions import Demonstrations
@@ -64,7 +64,7 @@ def appended(
             for p in (before.plans, more.plans)
         ]
     )
-    if twice := copies(plans, [*so_far(before.n), *episodes]):
+    if twice := copies(plans, [*names_in_use(before.n), *episodes]):
         raise InvalidDemonstrationsError(twice)
     again = [name for i, name in enumerate(episodes) if _is_there(before, more, i)]
     if again:

@@ -15,14 +15,9 @@ import numpy as np
 
 from prior_reinforce.arm.recordings.naming import vectors
 from prior_reinforce.arm.recordings.recording import Beside, Positions, Recording
-from prior_reinforce.arm.recordings.time_finder import Times, is_clock, says_time, tells_time
+from prior_reinforce.arm.recordings.time_finder import Times, is_clock, looks_like_time, says_time
 from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, Ambiguity, say_names, split_unit
-from prior_reinforce.plans.channels import (
-    commanded,
-    is_of_base,
-    measured_of,
-    says_no_position,
-)
+from prior_reinforce.plans.channels import commanded, is_of_base, measured_of, says_no_position
 from prior_reinforce.plans.interpolation import interp_columns
 from prior_reinforce.plans.signals import held_channels
 from prior_reinforce.plans.whole_turns import TURN
@@ -148,7 +143,7 @@ def twin_vectors(names: Sequence[str], values: Positions) -> Iterator[Ambiguity]
 def _is_series(name: str, moving: np.ndarray, others: Arrays) -> bool:
     """Whether an array of another length is sampled over time: by time stamps, or smoothly."""
     for other, values in others.items():
-        if other != name and values.shape == moving.shape[:1] and tells_time(other, values):
+        if other != name and values.shape == moving.shape[:1] and looks_like_time(other, values):
             return True
     through = np.abs(np.diff(moving, axis=0)).sum(axis=0) <= _BENDS * np.ptp(moving, axis=0)
     return len(moving) >= _FEWEST and bool(np.all(through))

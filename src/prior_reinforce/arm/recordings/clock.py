@@ -11,38 +11,30 @@ from typing import Any
 import numpy as np
 
 from prior_reinforce.arm.recordings.options import NO_COLUMN, ReadOptions
-from prior_reinforce.arm.recordings.rates import (
-    SAME_RATE,
-    DeclaredRate,
-    declared_rate,
-    either,
-    same_rate,
-)
 from prior_reinforce.arm.recordings.time_finder import (
     ARRAY_TIMES,
+    SAME_RATE,
     Clock,
     Columns,
+    DeclaredRate,
     FoundTimes,
     Stamps,
     Times,
     are_ticks,
+    declared_rate,
+    either,
     find_times,
+    guess_times,
     is_counter,
     is_frame_rate,
     is_periods,
     is_throw,
-    other_times,
     rises,
+    same_rate,
     says_time,
     skips_frames,
 )
-from prior_reinforce.arm.recordings.units import (
-    FRAME,
-    SECONDS,
-    Ambiguity,
-    judge_unit,
-    split_unit,
-)
+from prior_reinforce.arm.recordings.units import FRAME, SECONDS, Ambiguity, judge_unit, split_unit
 from prior_reinforce.errors import ConfigurationError, FileFormatError, InvalidDemonstrationsError
 from prior_reinforce.units import without_number
 
@@ -263,7 +255,7 @@ class _TimeStamps:
             )
 
 
-def clock_among(
+def clock_from_arrays(
     where: Path,
     episode: str,
     count: int,
@@ -292,8 +284,10 @@ def clock_among(
         found = FoundTimes()
     elif not found.columns:
         rate = options.rate or (declared.hertz if declared else None)
-        found = other_times(where, fit, rate, in_arrays=True)
-    return clock_at(f"{where}: {episode}", episode, count, found, every, options, declared)
+        found = guess_times(where, fit, rate, in_arrays=True)
+    return clock_from_columns(
+        f"{where}: {episode}", episode, count, found, every, options, declared
+    )
 
 
 def _rate_among(
@@ -316,7 +310,7 @@ def _are_periods(name: str, values: Any, count: int) -> bool:
     return stamps.shape == (count,) and is_periods(name.rpartition(".")[2], stamps)
 
 
-def clock_at(
+def clock_from_columns(
     where: str,
     episode: str,
     count: int,
@@ -336,11 +330,11 @@ def clock_at(
     )
     held = {columns[i][0]: columns[i][1] for i in found.held if columns[i][1].shape == (count,)}
     if count > 1:
-        hold_together(where, {name: clock.times, **held})
+        refuse_clocks_that_differ(where, {name: clock.times, **held})
     return replace(clock, ambiguities=(*found.guessed, *clock.ambiguities))
 
 
-def hold_together(where: str, clocks: Mapping[str, Times]) -> None:
+def refuse_clocks_that_differ(where: str, clocks: Mapping[str, Times]) -> None:
     """Refuse clocks of the same frames that contradict the first: FileFormatError names both.
 
     Another clock may be in another unit and begin anywhere; it may not run faster, or jump.

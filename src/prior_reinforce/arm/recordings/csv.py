@@ -34,20 +34,25 @@ from prior_reinforce.arm.recordings.recording import (
 )
 from prior_reinforce.arm.recordings.stated import (
     failures,
-    names_said,
     refuse_rates,
     says_success,
     says_valid,
+    stated_names,
     without_invalid,
 )
-from prior_reinforce.arm.recordings.table_heads import failed, headed, read_sidecar, with_heads
+from prior_reinforce.arm.recordings.table_heads import (
+    failed,
+    read_sidecar,
+    with_one_header,
+    with_stated_header,
+)
 from prior_reinforce.arm.recordings.table_times import (
-    called_times,
     clock_of_table,
+    columns_named_time,
     counts_rows,
+    find_column,
     is_coarse_time,
     is_long_format,
-    named_column,
     time_columns,
     with_whole_dates,
 )
@@ -103,21 +108,23 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             if len(paths) > 1 and _has_a_row_each(table, stems):
                 continue
             sidecar = read_sidecar(table, options.joints)
-            table = headed(table, sidecar, options.joints)
-            table = with_whole_dates(with_heads(table))
+            table = with_stated_header(table, sidecar, options.joints)
+            table = with_whole_dates(with_one_header(table))
             if not table.names or len(table) < 2:
                 raise FileFormatError(
                     f"{path} has {len(table)} frames; expected a line of column names and two "
                     "frames or more"
                 )
-            column, names, guessed = _throws(table, path.stem, options, alone=len(paths) == 1)
+            column, names, guessed = _episodes_of_rows(
+                table, path.stem, options, alone=len(paths) == 1
+            )
         rows = names.count("")
         left = (f"{rows} rows left out, which are of no episode",) * (0 < rows < len(names))
         for episode in sorted({*names} - {""} or {""}, key=natural_order):
             own = table.rows([i for i, name in enumerate(names) if name == episode])
             others = {*stems, *names} - {path.stem, episode}
-            remarks = (*left, *failed(table, sidecar, others))
-            how = episode, options, column, guessed, remarks
+            notes = (*left, *failed(table, sidecar, others))
+            how = episode, options, column, guessed, notes
             guarded = or_leave_out(path.stem, partial(_has_other_columns, path, paths, options))
             yield episode, guarded(partial(_episode, own, *how))
 
@@ -152,7 +159,7 @@ def _has_a_row_each(table: Table, episodes: Sequence[str]) -> bool:
     return len({*rows}) == len(table) and (said or not {*rows}.isdisjoint(episodes))
 
 
-def _throws(
+def _episodes_of_rows(
     table: Table, stem: str, options: ReadOptions, *, alone: bool
 ) -> tuple[int | None, Sequence[str], tuple[Ambiguity, ...]]:
     """Return the column of episodes, if there is one, each row's episode, and what is guessed.
@@ -166,7 +173,7 @@ def _throws(
     said = (i for i, name in enumerate(table.names) if name.lower() in EPISODE_COLUMNS)
     column = next(said, None)
     if options.episode_column is not None:
-        column = named_column(table, options.episode_column, "--episode-column")
+        column = find_column(table, options.episode_column, "--episode-column")
     if column is not None:
         _refuse_labels_again(table, column)
         return column, table.cells[column], ()
@@ -219,7 +226,7 @@ def _refuse_labels_again(table: Table, column: int) -> None:
 
 def _starts(table: Table, options: ReadOptions) -> list[int]:
     """Return the rows in which the time begins anew, and the first."""
-    time = next(iter(called_times(table, options)), None)
+    time = next(iter(columns_named_time(table, options)), None)
     if time is None or not table.is_number(time):
         return [0]
     times = table.values[:, time]
@@ -247,17 +254,18 @@ def _episode(
     options: ReadOptions,
     episode_column: int | None,
     guessed: tuple[Ambiguity, ...],
-    said_of_all: Sequence[str],
+    notes: Sequence[str],
 ) -> Recording:
-    log = next((g for g in LOG_FORMATS if set(g.columns) <= set(table.names)), None)
-    said, told = _names_in_cells(table, options)
-    called = [name or f"column {i + 1}" for i, name in enumerate(table.names)]
-    names = [said.get(i, name) for i, name in enumerate(table.names)]
+    """Return the recording in an episode's rows; `notes` are remarks on it."""
+    log = next((each for each in LOG_FORMATS if {*each.columns} <= {*table.names}), None)
+    in_cells, name_columns = _names_in_cells(table, options)
+    heads = [name or f"column {i + 1}" for i, name in enumerate(table.names)]
+    names = [in_cells.get(i, name) for i, name in enumerate(table.names)]
     joints = options.joints if table.named else None
     found = None if joints is None else find_channels(joints, names)
-    table, remark = _without_other_logs(table, found or ())
+    table, merged = _without_other_logs(table, found or ())
     times = time_columns(table, options, [episode_column, *(found or ())])
-    aside = {*times.columns, *times.held, episode_column, *told}
+    aside = {*times.columns, *times.held, episode_column, *name_columns}
     others = [i for i in range(len(names)) if i not in aside]
     channels, named = list(others), table.named
     _refuse_text(table, joints or (), names, found or ())
@@ -266,24 +274,24 @@ def _episode(
     elif table.named and (keys := options.key or ((log.key,) if log else ())):
         channels = _by_key(table, keys, others, options.joints or ())
         named = not options.joints and Kind.PLACE in kinds([names[i] for i in channels])
-    remarks = [*said_of_all, *remark]
+    remarks = [*notes, *merged]
     if log is not None:
         remarks.append(f"{log.name}: time in {log.time_unit}, motion is {log.key} (measured)")
     clock = clock_of_table(table, episode, times, options, log and log.time_unit)
     _refuse_second_log(table, clock.times if times.columns else np.zeros(len(table)))
     counts = [i for i in others if table.is_number(i) and counts_rows(table, i, clock.times)]
-    plain = channels == others and table.named and not options.joints
-    rising = [i for i in counts if plain or (i in channels and table.is_unnamed(i))]
+    unasked = channels == others and table.named and not options.joints
+    rising = [i for i in counts if unasked or (i in channels and table.is_unnamed(i))]
     all_read = not options.key and found is None
     texts = [i for i in others if table.is_text(i)]
     if not all_read:  # else only those that change between a few: `on` and `off`
         texts = [i for i in texts if 1 < len({*table.cells[i]} - {""}) <= _MOST_WORDS]
-    no_channel = [i for i in channels if plain and says_no_channel(called[i])]
+    no_channel = [i for i in channels if unasked and says_no_channel(heads[i])]
     no_channel *= len(no_channel) < len(channels)
     filled = {i: [*filter(None, table.cells[i])] for i in texts}
-    lists = [i for i, own in filled.items() if own and all(map(_SEVERAL.fullmatch, own))]
+    lists = [i for i, cells in filled.items() if cells and all(map(_SEVERAL.fullmatch, cells))]
     absent = [i for i in channels if found is None and np.all(table.values[:, i] == _ABSENT)]
-    is_flag = [table.named and (says_valid(name) or says_success(name)) for name in called]
+    is_flag = [table.named and (says_valid(name) or says_success(name)) for name in heads]
     flags = {i: _flag(table, i) for i in others if is_flag[i]}
     for left, why in (
         ([*flags, *no_channel], "is no joint by its name"),
@@ -293,29 +301,31 @@ def _episode(
         ([i for i in texts if i not in {*flags, *lists}], "holds no number"),
     ):
         channels = [i for i in channels if i not in left]
-        remarks += [f"{say_names([called[i] for i in left])} left out, which {why}"] * bool(left)
-    measured = {called[i]: flag for i, flag in flags.items()}
+        remarks += [f"{say_names([heads[i] for i in left])} left out, which {why}"] * bool(left)
+    measured = {heads[i]: flag for i, flag in flags.items()}
     positions, unmeasured = without_invalid(episode, table.columns(channels), measured)
-    twins = all_read and twin_vectors([called[i] for i in channels], table.values[:, channels])
-    own, units = without_units([called[i] for i in channels])
-    is_named = named or said.keys() >= {*channels}
-    own_names = [said.get(i, name) for i, name in zip(channels, own, strict=True)]
+    twins = all_read and twin_vectors([heads[i] for i in channels], table.values[:, channels])
+    bare, units = without_units([heads[i] for i in channels])
+    is_named = named or in_cells.keys() >= {*channels}
+    joint_names = [in_cells.get(i, name) for i, name in zip(channels, bare, strict=True)]
     if not is_named:  # by their places in the file
-        own_names = [] if table.named else [called[i].replace(" ", "") for i in channels]
-    rest = [i for i in others if i not in channels and not (i in counts and table.is_unnamed(i))]
+        joint_names = [] if table.named else [heads[i].replace(" ", "") for i in channels]
+    beside_motion = [
+        i for i in others if i not in channels and not (i in counts and table.is_unnamed(i))
+    ]
     return recorded(
         episode,
         clock,
         positions,
-        tuple(own_names),
+        tuple(joint_names),
         named=is_named,
         remarks=(*remarks, *unmeasured, *failures(measured)),
         units=tuple(table.units[i] or u for i, u in zip(channels, units, strict=True)),
         ambiguities=(*guessed, *clock.ambiguities, *(twins or ())),
-        columns=own if table.named else (),
+        columns=bare if table.named else (),
         beside=columns_beside(
-            [called[i] for i in (*channels, *rest)],
-            table.values[:, [*channels, *rest]],
+            [heads[i] for i in (*channels, *beside_motion)],
+            table.values[:, [*channels, *beside_motion]],
             range(len(channels)),
             clock.times,
         ),
@@ -373,7 +383,7 @@ def _names_in_cells(table: Table, options: ReadOptions) -> tuple[dict[int, str],
     numbers = [i for i in range(len(table.names)) if i not in texts]
     called = [table.names[i] for i in numbers]
     for count in sorted({len(own) for own in cells.values() if len(own) > 1}):
-        said = names_said(table.where, cells, count, options.joints)
+        said = stated_names(table.where, cells, count, options.joints)
         named = [i for key in options.key for i in vectors(called).get(key, ())]
         if said and not options.key:
             named = [called.index(name) for name in numbered_like(said, called) or ()]

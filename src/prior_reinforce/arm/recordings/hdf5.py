@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from prior_reinforce.arm.recordings.bounds import MOST_COLUMNS, check_numbers
-from prior_reinforce.arm.recordings.naming import said_in
+from prior_reinforce.arm.recordings.naming import read_metadata
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     Episodes,
@@ -30,7 +30,7 @@ from prior_reinforce.arm.recordings.stated import (
     by_field,
     motion_keys,
     other_count,
-    recorded_among,
+    recording_of_arrays,
     worth_reading,
 )
 from prior_reinforce.arm.recordings.time_finder import Stamps
@@ -68,11 +68,11 @@ class _Field:
     """A field of a record, read by itself: a record beside the motion may be of any size."""
 
     def __init__(self, record: Any, name: str) -> None:
-        own = record.dtype[name]
+        field = record.dtype[name]
         self.record, self.name, self.attrs = record, name, record.attrs
-        self.dtype, self.shape = own.base, (*record.shape, *own.shape)
+        self.dtype, self.shape = field.base, (*record.shape, *field.shape)
         # A chunk is of the whole record.
-        each = math.ceil(record.dtype.itemsize / own.base.itemsize)
+        each = math.ceil(record.dtype.itemsize / field.base.itemsize)
         self.chunks = (*record.chunks, each) if record.chunks else None
 
     def __getitem__(self, at: Any) -> Any:
@@ -90,18 +90,18 @@ def _demo(path: Path, top: Any, within: str, options: ReadOptions, episode: str)
         key, count = keys[0], found[keys[0]].shape[0]
         shapes = {name: own.shape for name, own in found.items() if own.dtype.kind in "biuf"}
         there = {name: _numbers(path, name, found[name]) for name in worth_reading(shapes, keys)}
-        of_key = found[key]
-        texts, stated = _said(top, group, of_key.record if isinstance(of_key, _Field) else of_key)
+        motion = found[key].record if isinstance(found[key], _Field) else found[key]
+        texts, stated = _metadata(top, group, motion)
         # By robomimic the frames of this very demonstration; elsewhere it may be a total.
         declared = stated.get("num_samples", count)
         if "num_samples" in group.attrs and np.any(declared > count):
             raise other_count(
                 f"{path}: {episode}", f"{declared} samples by num_samples", key, count
             )
-    return recorded_among(path, episode, keys, there, options, texts=texts, stated=stated)
+    return recording_of_arrays(path, episode, keys, there, options, texts=texts, stated=stated)
 
 
-def _said(
+def _metadata(
     top: Any, group: Any, own: Any
 ) -> tuple[dict[str, tuple[str, ...]], dict[str, np.ndarray]]:
     """Return texts and numbers in attributes and small arrays, the nearest to the motion first.
@@ -121,9 +121,9 @@ def _said(
                 if np.prod(kind(name).shape) <= MOST_COLUMNS:
                     values[name] = np.asarray(within[name])
         numbers = {name: value for name, value in values.items() if value.dtype.kind in "biuf"}
-        said, more = said_in({n: value for n, value in values.items() if n not in numbers})
+        nested, more = read_metadata({n: value for n, value in values.items() if n not in numbers})
         stated = numbers | {n: np.asarray(number) for n, number in more.items()} | stated
-        own_texts = {n: text for n, text in said.items() if len(text) > 1 or node == own}
+        own_texts = {n: text for n, text in nested.items() if len(text) > 1 or node == own}
         texts |= {n: text for n, text in own_texts.items() if n not in texts}
     return texts, stated
 

@@ -35,10 +35,10 @@ from prior_reinforce.arm.recordings.preview import Preview
 from prior_reinforce.arm.recordings.recording import Episodes, Recording, has_files
 from prior_reinforce.arm.recordings.selection import Selection, select
 from prior_reinforce.arm.recordings.takes import (
-    doubts_of_times,
-    increments_unsaid,
+    ambiguities_of_times,
+    ask_about_increments,
+    ask_about_several_throws,
     pauses,
-    several_throws,
     ways_back,
 )
 from prior_reinforce.arm.recordings.units import Ambiguity, raise_if_ambiguous
@@ -80,10 +80,6 @@ FORMATS: Mapping[str, Format] = {
 }
 """What can be read. `hdf5` covers robomimic, ManiSkill and ALOHA; `ros` ROS 1 bags, ROS 2 sqlite
 bags and MCAP; `zarr` is the replay buffer of Diffusion Policy."""
-_HOW_TO_SAVE = (
-    "save each episode as CSV (a line of names, a row a frame, the time in a column) or NPZ; what "
-    f"is read is {', '.join(FORMATS)} (--format, where a name does not tell)"
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,18 +204,18 @@ class Recordings:
     """A name of `FORMATS`."""
     options: ReadOptions
     episodes: tuple[Recording, ...]
-    """Those that were asked for, in order."""
+    """The episodes to use, in order."""
     there: tuple[str, ...]
     """Names of all episodes of the source."""
 
     @property
     def ambiguities(self) -> tuple[Ambiguity, ...]:
-        """What is only guessed of the times: the first episode's, for all with the same remedy."""
-        by_option = {one.option: one for one in doubts_of_times(self.episodes)}
-        unsaid = {"rests", "episodes", "leave_out"}.isdisjoint(self.options.given)
-        if len(self.episodes) > 1 or not unsaid or by_option:
-            return tuple(by_option.values())
-        return several_throws(self.episodes[0])
+        """Doubts about the times, one for each remedy; or whether one recording is several."""
+        doubts = tuple(ambiguities_of_times(self.episodes))
+        chosen = {"rests", "episodes", "leave_out"} & self.options.given.keys()
+        if doubts or chosen or len(self.episodes) > 1:
+            return doubts
+        return ask_about_several_throws(self.episodes[0])
 
     @property
     def outcome_places(self) -> list[Path]:
@@ -236,13 +232,14 @@ class Recordings:
         """Return the channels of the plan, as in `selection.select`, and what is only guessed."""
         joints, names = self.options.joints, wanted.names
         if (joints, names) == (None, None) and wanted.robot and not self.episodes[0].named:
-            joints = names = wanted.robot.joint_names  # asked about, since nothing names them
+            joints = names = wanted.robot.joint_names  # `select` asks whether it is these
         units, shares = (self.options.units, wanted.plan_units), self.format == "lerobot"
         selection = select(self.episodes, joints, names, *units, normalised=shares)
-        said = pauses(selection.recordings) if self.options.rests is None else ()
-        unsaid = increments_unsaid(selection.recordings, self.options.key or ()) * (names is None)
-        unclear = self.ambiguities + selection.ambiguities + unsaid
-        return replace(selection, ambiguities=unclear, remarks=(*selection.remarks, *said))
+        unclear = self.ambiguities + selection.ambiguities
+        if names is None:
+            unclear += ask_about_increments(selection.recordings, self.options.key)
+        rests = pauses(selection.recordings) if self.options.rests is None else ()
+        return replace(selection, ambiguities=unclear, remarks=(*selection.remarks, *rests))
 
     def imported(
         self,
@@ -268,14 +265,13 @@ class Recordings:
         may_lack: bool = False,
         take_guesses: bool = False,
     ) -> tuple[Outcomes, tuple[Ambiguity, ...]]:
-        """Find outcomes in their wanted units, and all that is only guessed, of the selection too.
+        """Return the outcomes in their wanted units, and all ambiguities, the selection's too.
 
         They are those `given` (a table, or numbers by episode in the wanted units), a table beside
-        the recordings, or the recordings' own. `unit` is of columns that name none. Where there are
-        none, what is unclear of the selection is said too; with `may_lack`, none are returned then.
-        ConfigurationError if the given outcomes are not numbers; InvalidDemonstrationsError if
-        there are none, a component is missing, or a row is of no episode of the source
-        (UnclearUnitsError if something is unclear); FileFormatError if the table is missing or
+        the recordings, or the recordings' own; `unit` is of columns that name none.
+        ConfigurationError if the given outcomes are not numbers; InvalidDemonstrationsError, or
+        UnclearUnitsError beside ambiguities, if there are none (unless they `may_lack`), a
+        component is missing, or a row is of no episode; FileFormatError if the table is missing or
         damaged.
         """
         others = [] if given is not None else csv.tables_of_outcomes(self.source, self.there)
@@ -298,13 +294,9 @@ class Recordings:
         return found, selection.ambiguities + doubts + more
 
     def _outcomes(
-        self,
-        given: GivenOutcomes,
-        names: Sequence[str] | None,
-        *,
-        may_lack: bool,
+        self, given: GivenOutcomes, names: Sequence[str] | None, *, may_lack: bool
     ) -> Outcomes:
-        """The outcomes, in the units that their source states."""
+        """Return the outcomes, in the units that their source states."""
         if isinstance(given, Mapping):
             try:
                 numbers = {str(name): tuple(map(float, value)) for name, value in given.items()}
@@ -333,7 +325,7 @@ class Recordings:
         )
 
     def _in_order(self, found: Outcomes) -> Outcomes:
-        """Check rows by their names; where one file was cut and none is named, take their order."""
+        """Match rows to motions by name; by their order if one file was cut and none is named."""
         motions = [recording.episode for recording in self.episodes]
         if self.options.rests and {*motions}.isdisjoint(found.episodes):
             return in_order(self.source, motions, found, ways_back(self.episodes))
@@ -411,7 +403,7 @@ def read(source: str | os.PathLike[str], options: ReadOptions | None = None) -> 
             f"{source} holds more than one episode named {', '.join(twice)}; rename their files"
         )
     if not there:
-        raise FileFormatError(f"{source} holds no episode of format {kind}; {_HOW_TO_SAVE}")
+        raise FileFormatError(f"{source} holds no episode of format {kind}; {_how_to_save()}")
     wanted = there if options.episodes is None else options.episodes
     missing = [e for e in (*wanted, *(options.leave_out or ())) if e not in there]
     if missing or not read_ones:
@@ -419,6 +411,13 @@ def read(source: str | os.PathLike[str], options: ReadOptions | None = None) -> 
         raise InvalidDemonstrationsError(f"{what} in {source}; it has {listed(there)}: name those")
     chosen = tuple(read_ones[name] for name in wanted if name in read_ones)
     return Recordings(source, kind, options, chosen, tuple(there))
+
+
+def _how_to_save() -> str:
+    return (
+        "save each episode as CSV (a line of names, a row a frame, the time in a column) or NPZ; "
+        f"what is read is {', '.join(FORMATS)} (--format, where a name does not tell)"
+    )
 
 
 def detect_format(source: Path) -> str:
@@ -441,4 +440,4 @@ def detect_format(source: Path) -> str:
                 f"{source} itself holds no recordings; name {folder}, which looks like "
                 f"{' or '.join(within)}{join}"
             )
-    raise FileFormatError(f"{source} holds nothing that can be read; {_HOW_TO_SAVE}")
+    raise FileFormatError(f"{source} holds nothing that can be read; {_how_to_save()}")

@@ -21,13 +21,22 @@ from jaxtyping import Shaped
 
 from prior_reinforce.arm.recordings.beside import may_move
 from prior_reinforce.arm.recordings.bounds import check_bytes, check_numbers
-from prior_reinforce.arm.recordings.clock import clock_among, clock_of, hold_together
-from prior_reinforce.arm.recordings.naming import missing_channels, said_in
+from prior_reinforce.arm.recordings.clock import (
+    clock_from_arrays,
+    clock_of,
+    refuse_clocks_that_differ,
+)
+from prior_reinforce.arm.recordings.naming import missing_channels, read_metadata
 from prior_reinforce.arm.recordings.options import NO_COLUMN, ReadOptions
-from prior_reinforce.arm.recordings.rates import DeclaredRate
 from prior_reinforce.arm.recordings.recording import Episodes, Positions, Recording, named_damage
-from prior_reinforce.arm.recordings.stated import recorded_among, says_success
-from prior_reinforce.arm.recordings.time_finder import Clock, Times, says_time, tells_time
+from prior_reinforce.arm.recordings.stated import recording_of_arrays, says_success
+from prior_reinforce.arm.recordings.time_finder import (
+    Clock,
+    DeclaredRate,
+    Times,
+    looks_like_time,
+    says_time,
+)
 from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.plans.channels import Kind, kinds, says_no_position
@@ -102,7 +111,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         of_tasks = (f"its task is {tasks.get(number)!r}",) * (len({*tasks.values()}) > 1)
         also: dict[str, Any] = {"clock": clock, "remarks": (*remarks, *of_tasks)}
         also["stated"] = {name: value for name, value in row.items() if says_success(name)}
-        return recorded_among(source, str(number), keys, arrays, options, texts=said, **also)
+        return recording_of_arrays(source, str(number), keys, arrays, options, texts=said, **also)
 
     for number in sorted(listed.keys() | frames.keys()):
         yield str(number), partial(episode_of, number)
@@ -148,12 +157,12 @@ def _clock(
     stamps = clocks.get(_STAMPS, index / rate)
     late = np.abs(stamps - stamps[0] - (index - index[0]) / rate).max() > _LATE / rate
     if asked or (late and options.time_column is None):
-        return clock_among(source, episode, len(index), clocks, options, {"fps": rate})
+        return clock_from_arrays(source, episode, len(index), clocks, options, {"fps": rate})
     clock = clock_of(episode, len(index), options, declared=DeclaredRate(rate, "fps"))
     clock = replace(clock, times=index * clock.period)
-    others = {n: a for n, a in clocks.items() if n != _STAMPS and tells_time(n, a)}
+    others = {n: a for n, a in clocks.items() if n != _STAMPS and looks_like_time(n, a)}
     if options.time_column is None and others:
-        hold_together(f"{source}: {episode}", {_STAMPS: clock.times} | others)
+        refuse_clocks_that_differ(f"{source}: {episode}", {_STAMPS: clock.times} | others)
     return clock
 
 
@@ -256,7 +265,7 @@ def _rows(column: Any) -> Positions:
 
 def _names(feature: Any) -> tuple[str, ...]:
     """Channel names in every form that writers give them; none where there are none."""
-    groups = said_in({"": feature.get("names") if isinstance(feature, dict) else None})[0]
+    groups = read_metadata({"": feature.get("names") if isinstance(feature, dict) else None})[0]
     names = tuple(chain(*groups.values()))
     if len(set(names)) < len(names):  # two arms whose joints have one name each
         names = tuple(f"{group}.{name}" for group, own in groups.items() for name in own)

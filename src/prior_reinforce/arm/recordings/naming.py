@@ -75,65 +75,67 @@ def numbered_like(joints: Sequence[str], there: Sequence[str]) -> tuple[str, ...
     return tuple(there[i] for i in fitting[clear[0]]) if len(clear) == 1 else None
 
 
-def words(said: Any) -> tuple[str, ...]:
+def words(values: Any) -> tuple[str, ...]:
     """Return the texts in an array, or in one text that lists several; none if it holds others."""
-    listed = said.ravel().tolist() if isinstance(said, np.ndarray) else said
-    found = list(listed) if isinstance(listed, (list, tuple)) else [listed]
-    found = [t.decode(errors="replace") if isinstance(t, bytes) else t for t in found]
-    if not all(isinstance(text, str) for text in found):
+    items = values.ravel().tolist() if isinstance(values, np.ndarray) else values
+    texts = list(items) if isinstance(items, (list, tuple)) else [items]
+    texts = [t.decode(errors="replace") if isinstance(t, bytes) else t for t in texts]
+    if not all(isinstance(text, str) for text in texts):
         return ()
-    if len(found) == 1:
-        text = found[0].strip().strip("[]()")
-        found = text.split(",") if "," in text else text.split()
-    return tuple(str(text).strip().strip("'\"") for text in found)
+    if len(texts) == 1:
+        text = texts[0].strip().strip("[]()")
+        texts = text.split(",") if "," in text else text.split()
+    return tuple(str(text).strip().strip("'\"") for text in texts)
 
 
-def said_in(named: Mapping[str, Any]) -> tuple[dict[str, tuple[str, ...]], dict[str, float]]:
+def read_metadata(
+    metadata: Mapping[str, Any],
+) -> tuple[dict[str, tuple[str, ...]], dict[str, float]]:
     """Return the texts and numbers in metadata of a file, by their path: `meta.fps`."""
     texts: dict[str, tuple[str, ...]] = {}
     numbers: dict[str, float] = {}
-    for name, said in named.items():
-        for place, value in _search(name, said):
+    for name, nested in metadata.items():
+        for path, value in _search(name, nested):
             if isinstance(value, (int, float)):
-                numbers.setdefault(place, value)
-            elif own := words(value):
-                texts.setdefault(place, own)
+                numbers.setdefault(path, value)
+            elif found := words(value):
+                texts.setdefault(path, found)
     return texts, numbers
 
 
-def _search(place: str, said: Any, depth: int = _DEEPEST) -> Iterator[tuple[str, Any]]:
+def _search(path: str, value: Any, depth: int = _DEEPEST) -> Iterator[tuple[str, Any]]:
     """Yield every number, text and list of texts in nested metadata, with its path."""
-    said = said.tolist() if isinstance(said, np.ndarray) else said
-    said = said[0] if isinstance(said, list) and len(said) == 1 else said
-    said = said.decode(errors="replace") if isinstance(said, bytes) else said
-    if isinstance(said, str) and said.lstrip("\ufeff \r\n\t")[:1] in ("{", "["):
+    value = value.tolist() if isinstance(value, np.ndarray) else value
+    value = value[0] if isinstance(value, list) and len(value) == 1 else value
+    value = value.decode(errors="replace") if isinstance(value, bytes) else value
+    if isinstance(value, str) and value.lstrip("\ufeff \r\n\t")[:1] in ("{", "["):
         with contextlib.suppress(ValueError, RecursionError):
-            said = json.loads(said.lstrip("\ufeff"))
-    if isinstance(said, list) and said and all(isinstance(one, Mapping) for one in said):
-        keys = [key for key in said[0] if all(key in one for one in said)]
-        said = {key: [one[key] for one in said] for key in keys}  # [{"name": "elbow"}, ...]
-    if isinstance(said, Mapping):
-        names = _numbered(said)
-        if all(isinstance(one, str) for one in said.values()):
-            names = names or _numbered({one: key for key, one in said.items()})
+            value = json.loads(value.lstrip("\ufeff"))
+    if isinstance(value, list) and value and all(isinstance(item, Mapping) for item in value):
+        keys = [key for key in value[0] if all(key in item for item in value)]
+        value = {key: [item[key] for item in value] for key in keys}  # [{"name": "elbow"}, ...]
+    if isinstance(value, Mapping):
+        names = _numbered(value)
+        if all(isinstance(item, str) for item in value.values()):
+            names = names or _numbered({item: key for key, item in value.items()})
         if names:
-            yield place, names
+            yield path, names
             return
-        for key, one in said.items() if depth else ():
-            yield from _search(f"{place}.{key}" if place else str(key), one, depth - 1)
-    elif isinstance(said, str) and said.lstrip()[:1] == "{":
+        for key, item in value.items() if depth else ():
+            yield from _search(f"{path}.{key}" if path else str(key), item, depth - 1)
+    elif isinstance(value, str) and value.lstrip()[:1] == "{":
         return
-    elif isinstance(said, (int, float, str)):
-        yield place, said
-    elif isinstance(said, (list, tuple)):
-        groups = said and all(isinstance(one, list) for one in said)
-        yield place, [*chain(*said)] if groups else [*said]
+    elif isinstance(value, (int, float, str)):
+        yield path, value
+    elif isinstance(value, (list, tuple)):
+        groups = value and all(isinstance(item, list) for item in value)
+        yield path, [*chain(*value)] if groups else [*value]
 
 
-def _numbered(said: Mapping[Any, Any]) -> list[str]:
+def _numbered(value: Mapping[Any, Any]) -> list[str]:
     """Return names by the numbers that they have, as `{"elbow": 0, "pan": 1}`; none of others."""
-    at = {str(n): str(name) for name, n in said.items() if isinstance(n, (int, str))}
-    numbers = list(map(str, range(len(said))))
+    at = {str(n): str(name) for name, n in value.items() if isinstance(n, (int, str))}
+    numbers = list(map(str, range(len(value))))
     return [at[number] for number in numbers] if sorted(at) == sorted(numbers) else []
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from prior_reinforce.arm.recordings.beside import Arrays
 from prior_reinforce.arm.recordings.bounds import MOST_BYTES, check_bytes
-from prior_reinforce.arm.recordings.naming import said_in
+from prior_reinforce.arm.recordings.naming import read_metadata
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     EPISODE_COLUMNS,
@@ -27,7 +27,7 @@ from prior_reinforce.arm.recordings.recording import (
     natural_order,
     unread,
 )
-from prior_reinforce.arm.recordings.stated import by_field, motion_keys, recorded_among
+from prior_reinforce.arm.recordings.stated import by_field, motion_keys, recording_of_arrays
 from prior_reinforce.arm.recordings.units import SECONDS, split_unit
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import open_npz
@@ -98,7 +98,9 @@ def _episodes(path: Path, arrays: Arrays, name: str, options: ReadOptions) -> Ep
             f"{path}: outcomes have shape {outcomes.shape}, expected numbers of shape "
             f"({len(motions)}, k)"
         )
-    texts, numbers = said_in({n: array for n, array in arrays.items() if array.dtype.kind in "SU"})
+    texts, numbers = read_metadata(
+        {n: array for n, array in arrays.items() if array.dtype.kind in "SU"}
+    )
     names = next((texts[name] for name in ("joint_names", "names") if name in texts), ())
     wrong = len(keys) == 1 and len(set(names)) != (*motions.shape, 1)[2]
 
@@ -112,7 +114,7 @@ def _episodes(path: Path, arrays: Arrays, name: str, options: ReadOptions) -> Ep
         said |= {"outcome": None if outcomes is None else outcomes[index]}
         said |= {"names": names if wrong else ()}
         there = {name: array for name, array in own.items() if array.ndim > 0}
-        yield episode, partial(recorded_among, path, episode, keys, there, options, **said)
+        yield episode, partial(recording_of_arrays, path, episode, keys, there, options, **said)
 
 
 def _arrays(path: Path) -> Arrays:

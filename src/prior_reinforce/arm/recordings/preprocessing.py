@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -106,25 +106,26 @@ def preprocess(
     Increments are summed up before and taken anew after. Speeds rest at 0. The time step is that of
     `settings`. InvalidDemonstrationsError if an episode never moves, exceeds the horizon, or leaps.
     """
-    units, increments = form.units, form.increments
+    increments = form.increments
     durations = [recording.duration for recording in recordings]
     if increments:
         recordings = [_with_poses(recording, increments) for recording in recordings]
-    refuse_leaps(recordings, units)
+    refuse_leaps(recordings, form.units)
     dt = settings.dt or _common_dt(recordings)
     recordings = [_held_while_unchanged(recording) for recording in recordings]
     every = [r.positions for r in recordings]
-    speeds = [i for i in zero_at_rest(form.names, units) if i not in increments]
-    signals = analyse(every, units, float(np.median([r.period for r in recordings])))
+    speeds = [i for i in zero_at_rest(form.names, form.units) if i not in increments]
+    signals = analyse(every, form.units, float(np.median([r.period for r in recordings])))
+    channels = _Channels(form.units, speeds, signals)
     spans = [(0.0, r.duration) for r in recordings]
     if settings.trim:
-        spans = [_moving_span(r, units, speeds, signals, settings.margin) for r in recordings]
+        spans = [_moving_span(r, channels, settings.margin) for r in recordings]
     sampled = [_resample(r, *s, dt, signals) for r, s in zip(recordings, spans, strict=True)]
     pieces, changes = [piece for piece, _ in sampled], None
     if settings.smooth is not None:
-        of_plans = analyse(pieces, units, dt)
+        of_plans = channels._replace(signals=analyse(pieces, form.units, dt))
         smooth = [
-            _smoothed(recording, piece, dt, settings.smooth, units, speeds, of_plans)
+            _smoothed(recording, piece, dt, settings.smooth, of_plans)
             for recording, piece in zip(recordings, pieces, strict=True)
         ]
         off = [after - before for before, after in zip(pieces, smooth, strict=True)]
@@ -141,7 +142,7 @@ def preprocess(
                 f"{horizon}; give a horizon of {longest}, or a larger dt (motions are never cut)"
             )
         held = frames < horizon
-        for remark in _remarks(recording, span, units, speeds, signals, jumping, held=held):
+        for remark in _remarks(recording, span, channels, jumping, held=held):
             remarks.setdefault(remark, []).append(recording.episode)
     longest_motion = max(end - start for start, end in spans)
     if longest_motion > LONGEST:
@@ -174,8 +175,17 @@ def preprocess(
     )
 
 
+class _Channels(NamedTuple):
+    """What is known of the channels of all recordings."""
+
+    units: tuple[str, ...]
+    speeds: Sequence[int]
+    """Columns of speeds, which are 0 at rest."""
+    signals: Signals
+
+
 def _with_poses(recording: Recording, increments: Sequence[int]) -> Recording:
-    """The recording with poses in place of increments; the last is reached a period later."""
+    """Sum up increments to poses; the last pose is reached a period later."""
     t, q, period = recording.times, recording.positions, recording.period
     size = np.abs(q[:, list(increments)])
     moving = np.any(size > _SMALL * size.max(axis=0), axis=1)
@@ -238,14 +248,13 @@ _Kind = IntEnum("_Kind", ["SLOW", "ENDS", "GAP", "FAILED", "READING", "STEP", "L
 def _remarks(
     recording: Recording,
     span: tuple[float, float],
-    units: tuple[str, ...],
-    speeds: Sequence[int],
-    signals: Signals,
+    channels: _Channels,
     jumping: Sequence[str],
     *,
     held: bool,
 ) -> Iterator[tuple[_Kind, str]]:
-    """Warnings about one episode: gaps, failed reads, jumps, and ends in mid-swing."""
+    """Warn about one episode: gaps, failed reads, jumps, and ends in mid-swing."""
+    units, speeds, signals = channels
     t, steps = recording.times, np.diff(recording.times)
     within = (t[1:] > span[0]) & (t[:-1] < span[1])
     still = np.all(np.diff(recording.positions, axis=0) == 0, axis=1)
@@ -286,15 +295,10 @@ def _remarks(
 
 
 def _smoothed(
-    recording: Recording,
-    frames: Frames,
-    dt: float,
-    frequency: float,
-    units: tuple[str, ...],
-    speeds: Sequence[int],
-    signals: Signals,
+    recording: Recording, frames: Frames, dt: float, frequency: float, channels: _Channels
 ) -> Frames:
-    """Frames without what is faster than a frequency, but for steps and switches."""
+    """Remove from frames what is faster than a frequency, but for steps and switches."""
+    units, speeds, signals = channels
     from scipy.signal import butter, sosfiltfilt
 
     if frequency >= 0.5 / dt:
@@ -343,21 +347,15 @@ def _held_while_unchanged(recording: Recording) -> Recording:
 
 
 def _common_dt(recordings: Sequence[Recording]) -> float:
-    """Median period, snapped to a whole rate that is within half a per cent of it."""
+    """Return the median period, or that of a whole rate which is nearly the same."""
     period = float(np.median([recording.period for recording in recordings]))
     rate = round(1 / period)
     return 1 / rate if rate > 0 and abs(rate * period - 1) < _WHOLE_RATE else period
 
 
-def _moving_span(
-    recording: Recording,
-    units: tuple[str, ...],
-    speeds: Sequence[int],
-    signals: Signals,
-    margin: float,
-) -> tuple[float, float]:
-    """From when to when a recording is kept, in [s]: its motion and a margin."""
-    t = recording.times
+def _moving_span(recording: Recording, channels: _Channels, margin: float) -> tuple[float, float]:
+    """Return from when to when a recording is kept, in [s]: its motion and a margin."""
+    (units, speeds, signals), t = channels, recording.times
     rows = moving_rows(recording.positions, signals.trim_band, speeds)
     if rows is None:
         raise InvalidDemonstrationsError(
@@ -383,7 +381,7 @@ def _moving_span(
 def _resample(
     recording: Recording, start: float, end: float, dt: float, signals: Signals
 ) -> tuple[Frames, list[str]]:
-    """Frames at start, start + dt, ... until the end is covered, and names of stepwise channels."""
+    """Return frames at start, start + dt, ... to the end, and names of stepwise channels."""
     t, q = recording.times, recording.positions
     count = max(2, math.ceil((end - start) / dt - _ON_GRID) + 1)
     if count > _MOST_FRAMES:

@@ -17,7 +17,7 @@ from jaxtyping import Float, Int
 from prior_reinforce.arm.recordings.appending import appended
 from prior_reinforce.arm.recordings.fit import slips
 from prior_reinforce.arm.recordings.inspection import Inspection, in_rows, say_small
-from prior_reinforce.arm.recordings.takes import so_far
+from prior_reinforce.arm.recordings.takes import names_in_use
 from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.errors import WorkspaceError
 from prior_reinforce.files import named_disk_errors
@@ -74,7 +74,7 @@ class Preview:
     @property
     def _names(self) -> list[str]:
         """What to call them."""
-        return [*so_far(self._whole.n - self.demonstrations.n), *self.episodes]
+        return [*names_in_use(self._whole.n - self.demonstrations.n), *self.episodes]
 
     @property
     def remarks(self) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ a message, or one a bag if each message has a single point.
 
 from __future__ import annotations
 
+import math
 import re
 import struct
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,18 +19,20 @@ import numpy as np
 
 from prior_reinforce.arm.recordings.beside import columns_beside, may_move
 from prior_reinforce.arm.recordings.bounds import check_numbers
+from prior_reinforce.arm.recordings.clock import clock_of
 from prior_reinforce.arm.recordings.messages import Message, read_messages
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import (
     Beside,
     Episodes,
+    Recording,
     has_suffix,
     is_hidden,
     named_damage,
     natural_order,
+    recorded,
     unread,
 )
-from prior_reinforce.arm.recordings.trajectories import read_trajectory
 from prior_reinforce.errors import FileFormatError
 from prior_reinforce.files import require_inside
 from prior_reinforce.plans.channels import is_of_base, says_no_position
@@ -48,6 +51,10 @@ _MAGIC, _HEAD = b"\x89MCAP0\r\n", struct.Struct("<8sBQI")
 _TIME = re.compile(r"builtin_interfaces/msg/(Time|Duration)|std_msgs/msg/Header")
 _MOST_BYTES = 2_000
 """Bytes of a message of a lift's or gripper's position at most. Ours: others are pictures."""
+
+_PERIOD = 0.01
+"""Between frames of a motion that is made of via points, in [s]; points that lie closer are its
+frames. Ours: controllers run at 100 Hz and more."""
 
 
 def recognises(source: Path) -> bool:
@@ -238,6 +245,37 @@ def _set_point(trajectory: Any) -> Any:
     return SimpleNamespace(
         header=header, name=list(trajectory.joint_names), position=point.positions
     )
+
+
+def read_trajectory(path: Path, episode: str, message: Any, options: ReadOptions) -> Recording:
+    """Return an episode of one JointTrajectory, with the motion that a controller makes of it.
+
+    ros2_control's joint_trajectory_controller joins via points by cubics through stated velocities,
+    by quintics through accelerations too, else by straight lines.
+    """
+    points, joints = message.points, tuple(message.joint_names)
+    times = np.array([p.time_from_start.sec + p.time_from_start.nanosec * 1e-9 for p in points])
+    positions = np.array([p.positions for p in points], dtype=float).reshape(len(times), -1)
+    stated = [positions]
+    for derivative in ("velocities", "accelerations"):
+        rows = [getattr(point, derivative) for point in points]
+        if any(len(row) != len(joints) for row in rows) or not np.all(np.isfinite(rows)):
+            break
+        stated.append(np.array(rows, dtype=float))
+    remarks = []
+    steps = np.diff(times)
+    if len(stated) > 1 and len(steps) and steps.min() > 0 and np.median(steps) > 2.01 * _PERIOD:
+        from scipy.interpolate import BPoly
+
+        frames = math.ceil((times[-1] - times[0]) / _PERIOD - 1e-6) + 1
+        check_numbers(path, episode, (frames, len(joints)))
+        curve = BPoly.from_derivatives(times, np.stack(stated, axis=1))
+        degree = "cubics through their velocities" if len(stated) == 2 else "quintics"
+        remarks.append(f"{len(times)} via points joined by {degree}, as a controller joins them")
+        times = np.linspace(times[0], times[-1], frames)
+        positions = curve(times)
+    clock = clock_of(episode, len(times), options, stamps=times, name="time_from_start", unit="s")
+    return recorded(episode, clock, positions, joints, remarks=remarks)
 
 
 def _topic(bag: Path, reader: Any, key: str | None, *, beside: bool) -> tuple[list[Any], str]:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from prior_reinforce.arm.recordings.beside import MASK, Arrays, arrays_beside, follows, may_move
-from prior_reinforce.arm.recordings.clock import clock_among
+from prior_reinforce.arm.recordings.clock import clock_from_arrays
 from prior_reinforce.arm.recordings.naming import (
     OTHER_NAMES,
     Texts,
@@ -33,12 +33,7 @@ from prior_reinforce.arm.recordings.recording import (
     without_units,
 )
 from prior_reinforce.arm.recordings.time_finder import Clock, says_time
-from prior_reinforce.arm.recordings.units import (
-    CHANNEL_UNITS,
-    Ambiguity,
-    known_unit,
-    say_names,
-)
+from prior_reinforce.arm.recordings.units import CHANNEL_UNITS, Ambiguity, known_unit, say_names
 from prior_reinforce.errors import FileFormatError, InvalidDemonstrationsError
 from prior_reinforce.plans.channels import (
     Kind,
@@ -91,9 +86,9 @@ def by_field(
     arrays: Mapping[str, Any], field_of: Callable[[Any, str], Any] = getitem
 ) -> dict[str, Any]:
     """Return arrays with each field of a record by itself, by the field's name."""
-    fields = [(name, field) for name, own in arrays.items() for field in own.dtype.names or ()]
+    fields = [(name, field) for name, array in arrays.items() for field in array.dtype.names or ()]
     twice = len({field for _, field in fields} | arrays.keys()) < len(fields) + len(arrays)
-    plain = {name: own for name, own in arrays.items() if not own.dtype.names}
+    plain = {name: array for name, array in arrays.items() if not array.dtype.names}
     return plain | {f"{n}.{f}" if twice else f: field_of(arrays[n], f) for n, f in fields}
 
 
@@ -110,7 +105,7 @@ def motion_keys(
     The motion has up to `most` dimensions, (T, D) or (N, T, D); an array of one joint has (T,).
     FileFormatError lists arrays that may be it if none is, or one has another shape or no numbers.
     """
-    shapes = {name: own.shape for name, own in arrays.items() if own.dtype.kind in "fiu"}
+    shapes = {name: array.shape for name, array in arrays.items() if array.dtype.kind in "fiu"}
     single = [name for name, shape in shapes.items() if len(shape) == 1]
     fit = sorted(name for name, shape in shapes.items() if 2 <= len(shape) <= most)
     there = [name for name in fit if not OUTCOME.fullmatch(name)]
@@ -144,7 +139,7 @@ def worth_reading(shapes: Mapping[str, Sequence[int]], keys: Sequence[str]) -> I
             yield name
 
 
-def recorded_among(
+def recording_of_arrays(
     where: Path,
     episode: str,
     keys: Sequence[str],
@@ -168,7 +163,7 @@ def recorded_among(
     # A number a frame is (T,), also where it was written as (T, 1) or (1, T).
     flat = {n: a.ravel() for n, a in arrays.items() if a.size == count and n not in keys}
     arrays = {**arrays, **flat}
-    kept, why = frames_said(f"{where}: {episode}", keys[0], {**stated, **arrays}, count)
+    kept, why = recorded_frames(f"{where}: {episode}", keys[0], {**stated, **arrays}, count)
     arrays, stated = (
         {n: a[:kept] if np.shape(a)[:1] == (count,) else a for n, a in each.items()}
         for each in (arrays, stated)
@@ -182,9 +177,9 @@ def recorded_among(
     bare, units = without_units(names or known)
     if not bare and len(positions) > 1:
         refuse_exchanged(episode, positions)
-    said = units_said(texts, bare or ("",) * positions.shape[1])
+    said = stated_units(texts, bare or ("",) * positions.shape[1])
     units = tuple(a or b for a, b in zip(said, units or (None,) * len(said), strict=False))
-    clock = clock or clock_among(where, episode, kept, arrays, options, stated, keys)
+    clock = clock or clock_from_arrays(where, episode, kept, arrays, options, stated, keys)
     others = {name: array for name, array in arrays.items() if name not in keys}
     called = (*keys, *(names or known))
     more["beside"] = arrays_beside(positions, others, clock.times, called)
@@ -201,8 +196,8 @@ def refuse_rates(where: str, keys: Sequence[str], joints: Sequence[str]) -> None
     if Kind.ANGLE not in kinds(joints) or any(map(says_no_position, joints)):
         return
     for key in keys:
-        own = _STEMS.split(key)[-1]
-        if says_no_position(own) and not is_of_pose(own) and not is_of_tool(own):
+        name = _STEMS.split(key)[-1]
+        if says_no_position(name) and not is_of_pose(name) and not is_of_tool(name):
             raise FileFormatError(
                 f"{where}: {key} looks like velocities, torques or the like, and not the positions "
                 f"of {say_names(joints)}: name what holds those with --key, or record them; if it "
@@ -214,21 +209,21 @@ def _refuse_normalised(
     where: str, positions: np.ndarray, stated: Mapping[str, Any], keys: Sequence[str]
 ) -> None:
     """Refuse a motion `q` that is far from the `mean` or `q_mean`, or the range, in its file."""
-    own = {"", *(_STEMS.split(key.lower())[-1] for key in keys)}
+    stems = {"", *(_STEMS.split(key.lower())[-1] for key in keys)}
     for words in (("mean", "std"), ("min", "max")):
-        said = [
+        limits = [
             np.ravel(numbers)
             for word in words
             for name, numbers in stated.items()
             if (stem := re.fullmatch(rf"(|.*[^a-z]){word}", name.lower()))
-            and _STEMS.split(stem[1].rstrip("/._ "))[-1] in own
+            and _STEMS.split(stem[1].rstrip("/._ "))[-1] in stems
             and np.size(numbers) == positions.shape[1]
             and np.asarray(numbers).dtype.kind in "fiu"
         ]
-        if len(said) != len(words):
+        if len(limits) != len(words):
             continue  # none, or of several arrays
-        one, two = said
-        low, high = (one - _FAR_OFF * two, one + _FAR_OFF * two) if words[0] == "mean" else said
+        one, two = limits
+        low, high = (one - _FAR_OFF * two, one + _FAR_OFF * two) if words[0] == "mean" else limits
         if np.all(low == -1) and np.all(high == 1):
             continue  # of what a controller takes, whatever is recorded
         middle = np.nanmedian(positions, axis=0)
@@ -245,11 +240,11 @@ def _refuse_scaled(where: str, positions: Positions, arrays: Arrays, keys: Seque
     most = np.nanmax(np.abs(positions), initial=0.0)
     if not any(_ACTIONS.search(key) for key in keys) or most > 1 + _ROUNDING:
         return
-    like = [n for n, own in arrays.items() if own.shape == positions.shape and n not in keys]
-    like = [n for n in like if _STATES.search(n) and not says_no_position(n)]
-    unlike = like and not any(follows(arrays[name], positions, (1.0,)) for name in like)
+    alike = [name for name, array in arrays.items() if array.shape == positions.shape]
+    joints = [n for n in alike if n not in keys and _STATES.search(n) and not says_no_position(n)]
+    unlike = joints and not any(follows(arrays[name], positions, (1.0,)) for name in joints)
     if most > 1 - _ROUNDING or unlike:
-        by_key = f"--key {' or '.join(like)}" if like else "--key"
+        by_key = f"--key {' or '.join(joints)}" if joints else "--key"
         raise FileFormatError(
             f"{where}: {keys[0]} stays within -1 and 1, as actions do that a controller scales: "
             f"name what was measured with {by_key}; if these are angles, say so with --units rad"
@@ -260,11 +255,12 @@ def _other_names(
     episode: str, texts: Texts, count: int, joints: Sequence[str]
 ) -> Iterator[Ambiguity]:
     """Ask about names that hold wanted joints, but are not as many as the columns."""
-    for key, own in texts.items():
-        missing = missing_channels(joints, own)
-        if len(missing) < len(joints) and tuple(joints)[: len(own)] != own:
-            order = shlex.join((*own, *missing)) if len(own) + len(missing) == count else "NAME ..."
-            what = f"{episode} has {count} columns, and {key} names {say_names(own)}"
+    for key, names in texts.items():
+        missing = missing_channels(joints, names)
+        if len(missing) < len(joints) and tuple(joints)[: len(names)] != names:
+            every = (*names, *missing)
+            order = shlex.join(every) if len(every) == count else "NAME ..."
+            what = f"{episode} has {count} columns, and {key} names {say_names(names)}"
             what += ": it looks as if these were the first, in that order"
             yield Ambiguity(what, f"--joints {order}")
             return
@@ -285,16 +281,16 @@ def _joined(
             f"the times of {keys[0]}: numpy.interp(its times, their own times, their values)"
         )
     widths = [column.shape[1] for column in columns]
-    said = list(names_said(where, texts, sum(widths), joints))
+    names = list(stated_names(where, texts, sum(widths), joints))
     place = _coordinates(keys[0], widths)
-    if len(keys) == 1 and not said:
-        said = place
-    if len(keys) > 1 and not said:
-        said = list(names_said(where, texts, widths[0], joints)) if widths[0] > 1 else [keys[0]]
-        said = said or place or [f"{keys[0]}_{i}" for i in range(widths[0])]
+    if len(keys) == 1 and not names:
+        names = place
+    if len(keys) > 1 and not names:
+        names = list(stated_names(where, texts, widths[0], joints)) if widths[0] > 1 else [keys[0]]
+        names = names or place or [f"{keys[0]}_{i}" for i in range(widths[0])]
         for key, width in zip(keys[1:], widths[1:], strict=True):
-            said += [key if width == 1 else f"{key}_{i}" for i in range(width)]
-    return np.concatenate(columns, axis=1).astype(np.float64), tuple(said)
+            names += [key if width == 1 else f"{key}_{i}" for i in range(width)]
+    return np.concatenate(columns, axis=1).astype(np.float64), tuple(names)
 
 
 def _coordinates(key: str, widths: Sequence[int]) -> list[str]:
@@ -308,7 +304,7 @@ def _coordinates(key: str, widths: Sequence[int]) -> list[str]:
     return names if is_place else []
 
 
-def names_said(
+def stated_names(
     where: object, texts: Texts, count: int, joints: Sequence[str] | None = None
 ) -> tuple[str, ...]:
     """Return the names of so many columns among a file's texts; none if there are none.
@@ -317,34 +313,34 @@ def names_said(
     """
     wanted = tuple(joints or ())
     fit = {
-        key: own
-        for key, own in texts.items()
-        if len(own) == len(set(own)) == count and all(own) and not says_no_position(key)
-        if not all(known_unit(word) for word in own)
+        key: names
+        for key, names in texts.items()
+        if len(names) == len(set(names)) == count and all(names) and not says_no_position(key)
+        if not all(known_unit(word) for word in names)
     }
-    sure = {k: own for k, own in fit.items() if len(missing_channels(wanted, own)) < len(wanted)}
-    called = {k: own for k, own in fit.items() if _NAMES.search(k) and not OTHER_NAMES.search(k)}
-    found = {own: key for key, own in (sure or called).items()}
-    if len(found) > 1:
-        each = "; ".join(f"{key} says {say_names(own)}" for own, key in found.items())
+    sure = [k for k, names in fit.items() if len(missing_channels(wanted, names)) < len(wanted)]
+    called = [key for key in fit if _NAMES.search(key) and not OTHER_NAMES.search(key)]
+    keys = {fit[key]: key for key in sure or called}
+    if len(keys) > 1:
+        each = "; ".join(f"{key} says {say_names(names)}" for names, key in keys.items())
         raise FileFormatError(
             f"{where} names the columns in two ways: {each}; keep the right one in the file"
         )
-    return next(iter(found), ())
+    return next(iter(keys), ())
 
 
-def units_said(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
+def stated_units(texts: Texts, names: Sequence[str]) -> tuple[str | None, ...]:
     """Return the stated unit of each column; a single one holds for all that can be in it."""
-    by_name = {key.rpartition(".")[2]: own for key, own in texts.items() if _IN_UNITS.search(key)}
+    by_name = {key.rpartition(".")[2]: texts[key] for key in texts if _IN_UNITS.search(key)}
     if {*names} & by_name.keys():  # {"units": {"elbow": "deg", ...}}
         texts = {"units": tuple(by_name.get(name, ("",))[0] for name in names)}
-    for key, own in texts.items():
-        if "unit" not in key.lower() or says_time(key) or len(own) not in (1, len(names)):
+    for key, words in texts.items():
+        if "unit" not in key.lower() or says_time(key) or len(words) not in (1, len(names)):
             continue
         if "." in key and (OTHER_NAMES.search(key) or not _UNIT.fullmatch(key)):
             continue
-        units = [unit if unit in CHANNEL_UNITS else None for unit in map(known_unit, own)]
-        if len(own) == 1 and units[0] is not None:
+        units = [unit if unit in CHANNEL_UNITS else None for unit in map(known_unit, words)]
+        if len(words) == 1 and units[0] is not None:
             units = one_for_all(units[0], names)
         if any(units):
             return tuple(units)
@@ -383,12 +379,13 @@ def says_success(name: str) -> bool:
     return _SUCCESS.fullmatch(_STEMS.split(name)[-1]) is not None
 
 
-def failures(said: Mapping[str, Any]) -> Iterator[str]:
+def failures(flags: Mapping[str, Any]) -> Iterator[str]:
     """Remark on flags, of the episode or of each frame, that call it failed."""
-    for name, value in said.items():
-        called = _SUCCESS.fullmatch(_STEMS.split(name)[-1])
-        own = {str(one).lower() for one in np.ravel(value).tolist()} if called else set()
-        if called and own and own <= _TRUE | _FALSE and bool(own & _TRUE) != bool(called["good"]):
+    for name, value in flags.items():
+        if (match := _SUCCESS.fullmatch(_STEMS.split(name)[-1])) is None:
+            continue
+        values = {str(one).lower() for one in np.ravel(value).tolist()}
+        if values and values <= _TRUE | _FALSE and bool(values & _TRUE) != bool(match["good"]):
             yield (
                 f"{name} calls it failed: its motion is learned, with where it landed; if it is no "
                 "motion to learn from, leave that episode out (--leave-out)"
@@ -403,7 +400,7 @@ def other_count(where: str, declared: str, key: str, count: int) -> FileFormatEr
     )
 
 
-def frames_said(
+def recorded_frames(
     where: str, key: str, stated: Mapping[str, Any], count: int
 ) -> tuple[int, tuple[str, ...]]:
     """Return how many frames are no padding, and a remark.

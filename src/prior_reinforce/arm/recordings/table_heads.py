@@ -12,13 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from prior_reinforce.arm.recordings.bounds import check_names
-from prior_reinforce.arm.recordings.naming import Texts, said_in
+from prior_reinforce.arm.recordings.naming import Texts, read_metadata
 from prior_reinforce.arm.recordings.stated import (
     JOINT_WORDS,
     OUTCOME,
     failures,
-    names_said,
-    units_said,
+    stated_names,
+    stated_units,
 )
 from prior_reinforce.arm.recordings.tables import Table, are_units, is_value
 from prior_reinforce.arm.recordings.time_finder import rises, says_time
@@ -70,7 +70,7 @@ def read_sidecar(table: Table, joints: Sequence[str] | None = None) -> Sidecar:
     alone = [p for p in path.parent.glob("*.json") if not p.with_suffix(path.suffix).exists()]
     found = [own] if own.is_file() else alone
     if len(found) == 1 and found[0].stat().st_size <= _MOST_SAID:
-        texts, numbers = said_in({"": found[0].read_bytes()})
+        texts, numbers = read_metadata({"": found[0].read_bytes()})
         said = {*chain(*texts.values()), *(key.rpartition(".")[2] for key in texts)}
         named = [name for name in {*table.names, *(joints or ())} & said if not says_time(name)]
         of_table = own.is_file() or len(named) > 1 or any(map(_OF_JOINTS.search, texts))
@@ -79,16 +79,18 @@ def read_sidecar(table: Table, joints: Sequence[str] | None = None) -> Sidecar:
     return Sidecar(path, {}, {})
 
 
-def headed(table: Table, sidecar: Sidecar, joints: Sequence[str] | None = None) -> Table:
+def with_stated_header(
+    table: Table, sidecar: Sidecar, joints: Sequence[str] | None = None
+) -> Table:
     """Return a table with the headers and units that its comments or its sidecar state.
 
     Names for all columns but the first are taken if that one rises, as times do. The table's own
     header counts more, and a single unit for all holds only for angles.
     """
     where, texts = sidecar.where, sidecar.texts
-    names = table.names if table.named else names_said(where, texts, len(table.names), joints)
+    names = table.names if table.named else stated_names(where, texts, len(table.names), joints)
     if not names and texts and len(table) and rises(table.stamps(0)):
-        names = names_said(where, texts, len(table.names) - 1, joints)
+        names = stated_names(where, texts, len(table.names) - 1, joints)
         names = ("t", *names) if names else ()
     if not names:
         return table
@@ -101,9 +103,9 @@ def headed(table: Table, sidecar: Sidecar, joints: Sequence[str] | None = None) 
         texts |= {"units": tuple(map(str, angles))}
     if table.named:
         texts = {k: own for k, own in texts.items() if len(own) > 1 or known_unit(own[0]) in TURN}
-    units = units_said(texts, names)
+    units = stated_units(texts, names)
     if not any(units):  # of the columns but the time's
-        units = (None, *units_said(texts, names[1:]))
+        units = (None, *stated_units(texts, names[1:]))
     units = tuple(
         own or (None if says_time(name) or split_unit(name, any_word=True)[1] else unit)
         for name, own, unit in zip(names, table.units, units, strict=True)
@@ -120,12 +122,12 @@ def failed(table: Table, sidecar: Sidecar, others: Collection[str]) -> Iterator[
     return failures({**comments, **own})
 
 
-def with_heads(table: Table) -> Table:
+def with_one_header(table: Table) -> Table:
     """Return a table with one header line, wherever its names stand."""
-    return _of_echo(_of_levels(table))
+    return _name_echoed_columns(_join_header_lines(table))
 
 
-def _of_levels(table: Table) -> Table:
+def _join_header_lines(table: Table) -> Table:
     """Join several header lines, as pandas writes for columns of several levels: `elbow/position`.
 
     They hold no number, date or `nan`, and the next line does. The last may hold units.
@@ -143,7 +145,7 @@ def _of_levels(table: Table) -> Table:
     return replace(table.rows(range(rows, len(table))), names=names, units=units)
 
 
-def _of_echo(table: Table) -> Table:
+def _name_echoed_columns(table: Table) -> Table:
     """Name the columns that `ros2 topic echo --csv` writes of a JointState; leave other tables.
 
     A row is the stamp in s and ns, the frame's name (column 3, no column if empty), the joints'

@@ -9,20 +9,21 @@ from itertools import product
 
 import numpy as np
 
-from prior_reinforce.arm.recordings.clock import clock_at, clock_of
+from prior_reinforce.arm.recordings.clock import clock_from_columns, clock_of
 from prior_reinforce.arm.recordings.options import NO_COLUMN, ReadOptions
-from prior_reinforce.arm.recordings.rates import DeclaredRate, declared_rate
 from prior_reinforce.arm.recordings.tables import Column, Table
 from prior_reinforce.arm.recordings.time_finder import (
     COLUMN_TIMES,
     FEWEST_COUNTS,
     Clock,
+    DeclaredRate,
     FoundTimes,
     Times,
+    declared_rate,
     find_times,
+    guess_times,
     is_clock,
     is_periods,
-    other_times,
     rises,
     says_time,
 )
@@ -73,17 +74,17 @@ def with_whole_dates(table: Table) -> Table:
     return table if whole.nanoseconds(names.index(table.names[time])) is None else whole
 
 
-def called_times(table: Table, options: ReadOptions) -> list[int]:
+def columns_named_time(table: Table, options: ReadOptions) -> list[int]:
     """Return the column that the user names as the time; else those named like one."""
     if options.time_column is not None:
         none = options.time_column == NO_COLUMN
-        return [] if none else [named_column(table, options.time_column, "--time-column")]
+        return [] if none else [find_column(table, options.time_column, "--time-column")]
     bare = (split_unit(name, SECONDS)[0].lower() for name in table.names)
     found = [i for i, name in enumerate(bare) if name in COLUMN_TIMES]
     return [i for i in found if len({*table.cells[i]}) > 1] or found  # a date alone stands still
 
 
-def named_column(table: Table, name: str, option: str) -> int:
+def find_column(table: Table, name: str, option: str) -> int:
     """Return a column by its name, with or without a unit, or by its number from 1."""
     bare = [split_unit(n, SECONDS)[0] for n in table.names]
     for one, names in product((name, f"column {name}"), (table.names, bare)):
@@ -98,7 +99,7 @@ def named_column(table: Table, name: str, option: str) -> int:
 
 def time_columns(table: Table, options: ReadOptions, others: Sequence[int | None]) -> FoundTimes:
     """Return the columns of time stamps; what rises steadily, and is no joint, may be one."""
-    called = called_times(table, options)
+    called = columns_named_time(table, options)
     if options.time_column is not None:
         summed = any(is_periods(table.names[i], table.values[:, i]) for i in called)
         return FoundTimes(tuple(called), summed=summed)
@@ -113,7 +114,7 @@ def time_columns(table: Table, options: ReadOptions, others: Sequence[int | None
         return found
     declared = _declared(table, options)
     rate = options.rate or (declared.hertz if declared else None)
-    found = other_times(table.where, free, rate, in_arrays=False)
+    found = guess_times(table.where, free, rate, in_arrays=False)
     return found if len(table.names) > 1 else FoundTimes()
 
 
@@ -195,7 +196,7 @@ def clock_of_table(
     frames = FRAME in (unit, options.time_unit)
     declared = _declared(table, options) if frames else None
     times = times._replace(held=tuple(i for i in times.held if table.is_number(i)), unit=unit)
-    return clock_at(table.where, episode, len(table), times, columns, options, declared)
+    return clock_from_columns(table.where, episode, len(table), times, columns, options, declared)
 
 
 def _check_times(table: Table, columns: Sequence[int]) -> None:

@@ -177,7 +177,7 @@ def apart_from_most(reach: Mapping[str, float], unit: str) -> tuple[str, ...]:
     return tuple(odd)
 
 
-def doubts_of_times(recordings: Sequence[Recording]) -> list[Ambiguity]:
+def ambiguities_of_times(recordings: Sequence[Recording]) -> list[Ambiguity]:
     """Return what is only guessed of the times, one doubt for each option.
 
     If only some takes are in another unit, no option holds for all: the fewer are to be left out.
@@ -205,7 +205,7 @@ def _without(what: str, episodes: Sequence[str]) -> Ambiguity:
     return Ambiguity(what, f"--leave-out {shlex.join(episodes)}", guessed=False)
 
 
-def so_far(n: int) -> list[str]:
+def names_in_use(n: int) -> list[str]:
     """Return what to call the demonstrations in use."""
     return [f"demonstration {i} so far" for i in range(n)]
 
@@ -219,7 +219,7 @@ def odd_starts(
 ) -> Iterator[str]:
     """Remark on takes that start far from the others; `before` are demonstrations in use."""
     motions, n = [*before, *motions], len(before)
-    episodes = [*so_far(n), *episodes]
+    episodes = [*names_in_use(n), *episodes]
     if len(motions) < 2:
         return
     starts = np.array([motion[0] for motion in motions])
@@ -279,7 +279,7 @@ def all_return(plans: Plans) -> str:
     )
 
 
-def several_throws(recording: Recording) -> tuple[Ambiguity, ...]:
+def ask_about_several_throws(recording: Recording) -> tuple[Ambiguity, ...]:
     """Ask whether a recording of many motions is several throws."""
     count = len(at_rests(recording, _REST))
     what = (
@@ -289,7 +289,7 @@ def several_throws(recording: Recording) -> tuple[Ambiguity, ...]:
     return (Ambiguity(what, f"--rests {_REST:g}"),) * (count > _MOST_MOTIONS)
 
 
-def increments_unsaid(
+def ask_about_increments(
     recordings: Sequence[Recording], keys: Sequence[str]
 ) -> tuple[Ambiguity, ...]:
     """Ask whether actions are increments of a tool's pose: all but a gripper rest at 0.

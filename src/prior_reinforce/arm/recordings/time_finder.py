@@ -1,4 +1,4 @@
-"""Find the time stamps among a table's columns, or a file's arrays."""
+"""Find the time stamps and the frame rate among a table's columns, or a file's arrays."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Float, Shaped
 
+from prior_reinforce.arm.recordings.naming import OTHER_NAMES
 from prior_reinforce.arm.recordings.units import FRAME, SECONDS, Ambiguity, split_unit
 from prior_reinforce.errors import FileFormatError
+from prior_reinforce.units import base_of
 
 Times = Float[np.ndarray, " T"]
 """Times of T frames, in [s]."""
@@ -72,6 +74,14 @@ _FEW_COUNTS = 100
 """Whole numbers with smaller steps may count anything, cycles of a servo for instance. Ours."""
 _SAME_CLOCK = 0.01
 """Share by which two clocks of a recording differ at most. Ours."""
+SAME_RATE = 0.05
+"""Rates that differ by a smaller share are one. Ours: clocks of recorders jitter and drift."""
+_LOWEST_RATE, _HIGHEST_RATE = 1e-3, 1e6
+"""Declared frames a second beyond which a file is damaged. Ours."""
+_RATE = re.compile(
+    r"((control|sampl[a-z]*|frame|record[a-z]*)[ _]?)?(fps|fs|hz|rate|freq(uency)?)([ _]?hz)?"
+)
+"""What files call their frames a second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +125,7 @@ def find_times(
     Other clocks must agree with it; with `no_motion`, so must every column that steps evenly.
     FileFormatError if two columns of one name differ.
     """
-    times = [*called, *(i for i, each in columns.items() if tells_time(*each))]
+    times = [*called, *(i for i, each in columns.items() if looks_like_time(*each))]
     increasing = [
         i
         for i, (name, own) in columns.items()
@@ -126,12 +136,12 @@ def find_times(
     if not times:
         periods = tuple(i for i, each in columns.items() if is_periods(*each))
         return FoundTimes(periods[:1], summed=bool(periods))
-    _refuse_several(where, [own for i, own in columns.items() if i in times])
+    _refuse_times_that_differ(where, [own for i, own in columns.items() if i in times])
     rate = _rate_of(columns[times[0]][1])
     others = [
         i
         for i, (_, own) in columns.items()
-        if skips_frames(own) or (no_motion and _samples(rate, own))
+        if skips_frames(own) or (no_motion and _steps_evenly(rate, own))
     ]
     first, *held = dict.fromkeys([*times, *increasing, *others])
     doubts: tuple[Ambiguity, ...] = ()
@@ -143,7 +153,7 @@ def find_times(
     return FoundTimes((first,), tuple(held), guessed=doubts)
 
 
-def other_times(
+def guess_times(
     where: object, columns: Columns, rate: float | None, *, in_arrays: bool
 ) -> FoundTimes:
     """Return what may be time stamps although no name says so: a column that rises steadily.
@@ -171,7 +181,7 @@ def other_times(
     return FoundTimes((rising[0],), guessed=(Ambiguity(what, option, guessed=False),))
 
 
-def _refuse_several(where: object, times: Sequence[tuple[str, Stamps]]) -> None:
+def _refuse_times_that_differ(where: object, times: Sequence[tuple[str, Stamps]]) -> None:
     """Refuse times of one name, `Time.1` beside it, that differ by half a frame or more."""
     for (name, one), (again, other) in combinations(times, 2):
         bare, same = (re.sub(r"\.\d+$", "", each) for each in (name, again))
@@ -229,7 +239,7 @@ def rises(values: Stamps) -> bool:
     return bool(len(steps) > 1 and np.all(steps > 0) and steps.max() < 10 * np.median(steps))
 
 
-def tells_time(name: str, values: Stamps) -> bool:
+def looks_like_time(name: str, values: Stamps) -> bool:
     """Whether a column rises steadily, and its name, unit or numbers are those of a time."""
     said = says_time(name) or split_unit(name, SECONDS)[1] is not None
     return (said or are_ticks(values) or epoch_unit(values) is not None) and rises(values)
@@ -258,12 +268,12 @@ def _runs_at(rate: float, stamps: Stamps, factor: float) -> bool:
 
 def _may_be_clock(rate: float | None, name: str, stamps: Stamps) -> bool:
     """Whether an array that rises may be a clock, which runs at the rate if that is known."""
-    if rate is not None and _samples(rate, stamps):
+    if rate is not None and _steps_evenly(rate, stamps):
         return True
     return not COUNTER.search(name.lower()) and (rate is None or _runs_at(rate, stamps, _NEARLY))
 
 
-def _samples(rate: float, stamps: Stamps) -> bool:
+def _steps_evenly(rate: float, stamps: Stamps) -> bool:
     """Whether a column of any name steps evenly, at about the frame rate.
 
     Numbers that begin long before the recording, as since a machine was started, are surely a
@@ -340,3 +350,71 @@ def is_clock(name: str, values: Times, times: Times) -> bool:
     line = values[0] + (values[-1] - values[0]) * (times - times[0]) / seconds
     near = np.abs(values - line).max() <= 3 * np.median(steps)
     return bool(near and any(abs(rate - 1) < _SAME_CLOCK for rate in rates))
+
+
+class DeclaredRate(NamedTuple):
+    """A frame rate that a file declares."""
+
+    hertz: float
+    name: str
+    """What the file calls it: `fps`, or `dt_ms`, of which it is the inverse."""
+
+    def check(self, episode: str) -> None:
+        """Refuse a rate at which nothing is recorded: FileFormatError."""
+        if not _LOWEST_RATE < self.hertz < _HIGHEST_RATE:
+            raise FileFormatError(
+                f"episode {episode}: {self.name} says {self.hertz:g} frames a second; mend it, or "
+                "leave it out"
+            )
+
+    @property
+    def likely(self) -> list[float]:
+        """What it may be, in [Hz]: `dt` 20, at which no arm is recorded, is in ms, or a rate."""
+        if is_frame_rate(self.hertz):
+            return [self.hertz]
+        in_units = [self.hertz / scale for u, scale in SECONDS.items() if u not in ("min", "h")]
+        inverse = [1 / self.hertz]
+        is_rate = _RATE.fullmatch(self.name.lower())
+        return list(filter(is_frame_rate, inverse + in_units if is_rate else in_units + inverse))
+
+
+def declared_rate(
+    where: object, numbers: Mapping[str, Any], given: float | None = None
+) -> DeclaredRate | None:
+    """Return the frame rate among the numbers of a file: `fps` 50 or `dt_ms` 20.
+
+    Numbers deep in it, `meta.fps`, count less. FileFormatError if two differ, and none of them is
+    the `given` rate.
+    """
+    found: dict[str, DeclaredRate] = {}
+    for path, value in sorted(numbers.items(), key=lambda item: "." in item[0]):
+        place, _, name = path.rpartition(".")
+        is_period, unit = says_period(name), split_unit(name, SECONDS)[1]
+        if OTHER_NAMES.search(place) or not (is_period or _RATE.fullmatch(name.lower())):
+            continue
+        if np.size(value) != 1 or np.asarray(value).dtype.kind not in "fiu":
+            raise FileFormatError(
+                f"{where}: {path} is no number; expected times t, or dt, or rate: mend it, or "
+                "leave it unread with --time-column none --rate HZ"
+            )
+        number = float(value) * base_of(unit or "s")[1]
+        found[path] = DeclaredRate(1 / number if is_period and number else number, name)
+    agree = [path for path, rate in found.items() if given and same_rate(given, rate.hertz)]
+    first = next(iter((*agree, *found)), "")
+    for path, (hertz, _) in found.items():
+        if given is None and not same_rate(hertz, found[first].hertz):
+            raise FileFormatError(
+                f"{where}: {first} says {found[first].hertz:.4g} frames a second, but {path} "
+                f"{hertz:.4g}; take one: --rate"
+            )
+    return found.get(first)
+
+
+def same_rate(one: float, two: float) -> bool:
+    """Whether two rates differ by no more than clocks do."""
+    return abs(one - two) <= SAME_RATE * two
+
+
+def either(rates: Sequence[float]) -> str:
+    """Name rates of which one holds: `50 or 20`."""
+    return " or ".join(f"{rate:.4g}" for rate in rates)

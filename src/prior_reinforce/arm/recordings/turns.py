@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from prior_reinforce.arm.recordings.selection import Selection
-from prior_reinforce.arm.recordings.takes import so_far
+from prior_reinforce.arm.recordings.takes import names_in_use
 from prior_reinforce.arm.robots.limits import RobotLimits, joint_of, with_turns
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.channels import Kind, kinds, zero_at_rest
@@ -74,7 +74,7 @@ def aligned(
     use `before`. InvalidDemonstrationsError if it cannot be told which way round a joint went.
     """
     shown = () if before is None else before.plans
-    episodes = [*so_far(len(shown)), *selection.episodes]
+    episodes = [*names_in_use(len(shown)), *selection.episodes]
     motions = [*np.array(shown), *(np.array(each.positions) for each in selection.recordings)]
     form = with_turns(PlanFormat(selection.names, selection.units, 1.0), limits)
     recorded = zip(selection.names, selection.recorded_units, strict=True)

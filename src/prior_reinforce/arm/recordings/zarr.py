@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 
 from prior_reinforce.arm.recordings.bounds import check_bytes, check_chunks, check_numbers
-from prior_reinforce.arm.recordings.naming import said_in
+from prior_reinforce.arm.recordings.naming import read_metadata
 from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.recording import Episodes, named_damage
 from prior_reinforce.arm.recordings.stated import (
     motion_keys,
-    recorded_among,
+    recording_of_arrays,
     says_success,
     worth_reading,
 )
@@ -76,7 +76,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             if name.startswith("meta/") and says_success(name) and shape == ends.shape
         }
         nodes = (group[f"data/{keys[0]}"], group["data"], group)
-        texts, stated = said_in({n: said for node in nodes[::-1] for n, said in node.attrs.items()})
+        texts, stated = read_metadata({n: v for node in nodes[::-1] for n, v in node.attrs.items()})
         stated = {f".{name}": number for name, number in stated.items()}  # of all episodes: a rate
     if ends.size == 0:
         raise FileFormatError(f"{source} holds no episode; copy the store again")
@@ -93,7 +93,7 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         }
         also = {name: array[i] for name, array in of_each.items()}
         said: dict[str, Any] = {"texts": texts, "stated": stated | also}
-        yield str(i), partial(recorded_among, source, str(i), keys, own, options, **said)
+        yield str(i), partial(recording_of_arrays, source, str(i), keys, own, options, **said)
 
 
 def _numbers(source: Path, group: Any, arrays: Arrays, name: str) -> Stamps:
