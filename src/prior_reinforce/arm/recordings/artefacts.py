@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from prior_reinforce.arm.recordings.recording import Recording
-from prior_reinforce.arm.recordings.time_finder import Times, is_set_on
+from prior_reinforce.arm.recordings.time_finder import GAP, Times, is_set_on
 from prior_reinforce.errors import InvalidDemonstrationsError
 from prior_reinforce.plans.channels import Kind, kinds
 from prior_reinforce.plans.signals import noise
@@ -42,8 +42,6 @@ _AROUND = 8
 before and after. Ours: the peak of a flick of 0.2 s is 7.5 times as far off at 15 Hz."""
 _THERE_AND_BACK = 0.14
 """Time in which no arm goes anywhere and comes back, in [s]. Ours."""
-_WAITS = 3.0
-"""A stall takes more than so many times the usual wait for a new frame. Ours, as of a gap."""
 _ACROSS = 2.0
 """Across a stall a channel moves by so many times its steps around, and about as fast. Ours."""
 _FAST = 0.5
@@ -233,6 +231,6 @@ def stalls(recording: Recording) -> Iterator[tuple[float, float]]:
     slow, fast = (of(speeds[:-2], speeds[2:]) for of in (np.minimum, np.maximum))
     alike = (slow > 0) & (slow < _ALIKE * speeds[1:-1]) & (speeds[1:-1] < _ALIKE * fast)
     leaps = steps[1:-1] > _ACROSS * np.maximum(steps[:-2], steps[2:])
-    long = (waits > _WAITS * np.median(waits)) & (np.diff(new) > 1)
+    long = (waits > GAP * np.median(waits)) & (np.diff(new) > 1)
     for i in (np.flatnonzero(long[1:-1] & np.any(alike & leaps, axis=1)) + 1).tolist():
         yield float(t[i]), float(waits[i])

@@ -15,7 +15,7 @@ from msgspec import Meta
 
 from prior_reinforce.arm.recordings.artefacts import failed_reads, held_frames, refuse_leaps, stalls
 from prior_reinforce.arm.recordings.recording import Recording
-from prior_reinforce.arm.recordings.time_finder import LONGEST
+from prior_reinforce.arm.recordings.time_finder import GAP, LONGEST
 from prior_reinforce.arm.recordings.units import say_names
 from prior_reinforce.arrays import Frames, Plans
 from prior_reinforce.errors import ConfigurationError, InvalidDemonstrationsError
@@ -39,10 +39,8 @@ _SMALL = 0.01
 """Part of the largest increment below which nothing moves. Ours: noise is less."""
 _WHOLE_RATE = 0.005
 """A median period this share from a whole rate is that rate. Ours: clocks drift by less."""
-_GAP = 3
-"""Time without a frame is a gap from so many periods on. Ours: less is jitter of a recorder."""
 _STANDSTILL = 8
-"""And so many where the arm may have stood still. Ours: recorders that lose frames lose fewer."""
+"""Periods of a gap in which the arm may have stood still. Ours: lost frames are fewer."""
 _LITTLE, _SPARSE = 0.5, 0.1
 """Share of a channel's largest step that is little across a gap, and share of steps that are late
 where a recorder writes changes only. Ours."""
@@ -259,7 +257,7 @@ def _remarks(
     within = (t[1:] > span[0]) & (t[:-1] < span[1])
     still = np.all(np.diff(recording.positions, axis=0) == 0, axis=1)
     worst = int(np.argmax(np.where(within & ~still, steps, 0.0)))
-    if not still[worst] and steps[worst] > _GAP * recording.period:
+    if not still[worst] and steps[worst] > GAP * recording.period:
         yield _Kind.GAP, f"nothing recorded for {steps[worst]:.3f} s at {t[worst]:.2f} s"
     for start, wait in stalls(recording):
         what = "nothing recorded in mid-motion for"

@@ -62,6 +62,8 @@ _EPOCH = (1e9, 4.1e9)
 _PERIODS, SHIFT = 3.0, 0.1
 """A clock was set where it leaps by more than so many periods, and by more than so long, in [s].
 Ours: queues of messages hold them for some 10 ms."""
+GAP = 3.0
+"""Time without a new frame is a gap beyond so many periods. Ours: less is a recorder's jitter."""
 _DETOUR, _MOVES = 0.01, 0.02
 """In the order of a clock that was set back, channels go further by at least this part of their
 ranges; only channels that move by at least this part of the largest range count. Ours."""
@@ -128,20 +130,20 @@ def find_times(
     times = [*called, *(i for i, each in columns.items() if looks_like_time(*each))]
     increasing = [
         i
-        for i, (name, own) in columns.items()
-        if says_time(name) and len(own) > 1 and np.all(np.diff(own.astype(float), axis=0) > 0)
+        for i, (name, values) in columns.items()
+        if says_time(name) and len(values) > 1 and np.all(np.diff(values.astype(float), axis=0) > 0)
     ]
     is_sure = bool(times)
     times = times or increasing or [i for i, each in columns.items() if counts_down(*each)]
     if not times:
         periods = tuple(i for i, each in columns.items() if is_periods(*each))
         return FoundTimes(periods[:1], summed=bool(periods))
-    _refuse_times_that_differ(where, [own for i, own in columns.items() if i in times])
+    _refuse_times_that_differ(where, [columns[i] for i in columns if i in times])
     rate = _rate_of(columns[times[0]][1])
     others = [
         i
-        for i, (_, own) in columns.items()
-        if skips_frames(own) or (no_motion and _steps_evenly(rate, own))
+        for i, (_, values) in columns.items()
+        if skips_frames(values) or (no_motion and _steps_evenly(rate, values))
     ]
     first, *held = dict.fromkeys([*times, *increasing, *others])
     doubts: tuple[Ambiguity, ...] = ()
@@ -162,7 +164,7 @@ def guess_times(
     Arrays may hold anything: exactly one must rise, not be named a counter, and run nearly at the
     rate.
     """
-    rising = [i for i, (_, own) in columns.items() if rises(own)]
+    rising = [i for i, (_, values) in columns.items() if rises(values)]
     if rate is not None or in_arrays:  # what counts frames one by one, or few, says nothing
         long = [i for i in rising if len(columns[i][1]) >= FEWEST_COUNTS]
         rising = [i for i in long if np.any(np.diff(columns[i][1]) != 1)]
@@ -170,7 +172,7 @@ def guess_times(
         rising = [i for i in rising if _may_be_clock(rate, *columns[i])]
         rising = rising if len(rising) == 1 else []
     if rate is not None:
-        skipping = [i for i, (_, own) in columns.items() if skips_frames(own)]
+        skipping = [i for i, (_, values) in columns.items() if skips_frames(values)]
         return FoundTimes((*skipping, *rising)[:1], unit=FRAME if skipping else None)
     if not rising:
         return FoundTimes()
