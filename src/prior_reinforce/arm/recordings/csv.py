@@ -8,7 +8,7 @@ from __future__ import annotations
 import contextlib
 import re
 import shlex
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -155,8 +155,8 @@ def _has_a_row_each(table: Table, episodes: Sequence[str]) -> bool:
         return False
     key = key_column(table)
     rows = () if key is None else names_in(table, key)
-    said = key is not None and table.names[key].lower() in ROW_COLUMNS
-    return len({*rows}) == len(table) and (said or not {*rows}.isdisjoint(episodes))
+    named = key is not None and table.names[key].lower() in ROW_COLUMNS
+    return len({*rows}) == len(table) and (named or not {*rows}.isdisjoint(episodes))
 
 
 def _episodes_of_rows(
@@ -283,13 +283,8 @@ def _episode(
     unasked = channels == others and table.named and not options.joints
     rising = [i for i in counts if unasked or (i in channels and table.is_unnamed(i))]
     all_read = not options.key and found is None
-    texts = [i for i in others if table.is_text(i)]
-    if not all_read:  # else only those that change between a few: `on` and `off`
-        texts = [i for i in texts if 1 < len({*table.cells[i]} - {""}) <= _MOST_WORDS]
     no_channel = [i for i in channels if unasked and says_no_channel(heads[i])]
     no_channel *= len(no_channel) < len(channels)
-    filled = {i: [*filter(None, table.cells[i])] for i in texts}
-    lists = [i for i, cells in filled.items() if cells and all(map(_SEVERAL.fullmatch, cells))]
     absent = [i for i in channels if found is None and np.all(table.values[:, i] == _ABSENT)]
     is_flag = [table.named and (says_valid(name) or says_success(name)) for name in heads]
     flags = {i: _flag(table, i) for i in others if is_flag[i]}
@@ -297,8 +292,7 @@ def _episode(
         ([*flags, *no_channel], "is no joint by its name"),
         (absent, "is 9E+09 all along, as ABB writes of an axis that is not there"),
         (rising, "rises with every row, as times and counters do"),
-        (lists, "holds several numbers in a cell; write a column a number, or lists in brackets"),
-        ([i for i in texts if i not in {*flags, *lists}], "holds no number"),
+        *_texts(table, others, flags, all_read=all_read),
     ):
         channels = [i for i in channels if i not in left]
         remarks += [f"{say_names([heads[i] for i in left])} left out, which {why}"] * bool(left)
@@ -330,6 +324,19 @@ def _episode(
             clock.times,
         ),
     )
+
+
+def _texts(
+    table: Table, others: Sequence[int], flags: Collection[int], *, all_read: bool
+) -> Iterator[tuple[list[int], str]]:
+    """Yield columns of text that are no channels, and why; unless `all_read`, switches alone."""
+    texts = [i for i in others if table.is_text(i)]
+    if not all_read:  # `on` and `off`
+        texts = [i for i in texts if 1 < len({*table.cells[i]} - {""}) <= _MOST_WORDS]
+    filled = {i: [*filter(None, table.cells[i])] for i in texts}
+    lists = [i for i, cells in filled.items() if cells and all(map(_SEVERAL.fullmatch, cells))]
+    yield lists, "holds several numbers in a cell; write a column a number, or lists in brackets"
+    yield [i for i in texts if i not in {*flags, *lists}], "holds no number"
 
 
 def _without_other_logs(table: Table, found: Sequence[int]) -> tuple[Table, tuple[str, ...]]:
@@ -381,36 +388,36 @@ def _names_in_cells(table: Table, options: ReadOptions) -> tuple[dict[int, str],
     groups |= {table.names[i]: [i] for i in texts}
     cells = {stem: _cells(table, group, 0) for stem, group in groups.items()}
     numbers = [i for i in range(len(table.names)) if i not in texts]
-    called = [table.names[i] for i in numbers]
-    for count in sorted({len(own) for own in cells.values() if len(own) > 1}):
-        said = stated_names(table.where, cells, count, options.joints)
-        named = [i for key in options.key for i in vectors(called).get(key, ())]
-        if said and not options.key:
-            named = [called.index(name) for name in numbered_like(said, called) or ()]
-        if not said or len(named) != count:
+    heads = [table.names[i] for i in numbers]
+    for count in sorted({len(labels) for labels in cells.values() if len(labels) > 1}):
+        names = stated_names(table.where, cells, count, options.joints)
+        named = [i for key in options.key for i in vectors(heads).get(key, ())]
+        if names and not options.key:
+            named = [heads.index(name) for name in numbered_like(names, heads) or ()]
+        if not names or len(named) != count:
             continue
-        stem = next(stem for stem, own in cells.items() if own == said)
+        stem = next(stem for stem, labels in cells.items() if labels == names)
         for row, line in enumerate(table.lines):
-            if (own := _cells(table, groups[stem], row)) != said and any(own):
+            if (labels := _cells(table, groups[stem], row)) != names and any(labels):
                 raise FileFormatError(
-                    f"{table.where}, line {line}: {stem} says {say_names(own)}, before "
-                    f"{say_names(said)}; write rows of one publisher, in one order"
+                    f"{table.where}, line {line}: {stem} says {say_names(labels)}, before "
+                    f"{say_names(names)}; write rows of one publisher, in one order"
                 )
-        return dict(zip((numbers[i] for i in named), said, strict=True)), {*groups[stem]}
+        return dict(zip((numbers[i] for i in named), names, strict=True)), {*groups[stem]}
     return {}, set()
 
 
 def _cells(table: Table, columns: Sequence[int], row: int) -> tuple[str, ...]:
     """Return the texts in some cells of a row, or in the list in a single cell."""
-    own = [table.cells[i][row] for i in columns]
-    return words(own[0] if len(own) == 1 else own)
+    texts = [table.cells[i][row] for i in columns]
+    return words(texts[0] if len(texts) == 1 else texts)
 
 
 def _flag(table: Table, column: int) -> np.ndarray:
     """Return a column's numbers, with 1 for `True`, as pandas writes it, and 0 for `False`."""
-    said = {"true": 1.0, "false": 0.0}
+    flags = {"true": 1.0, "false": 0.0}
     cells = zip(table.cells[column], table.values[:, column], strict=True)
-    return np.array([said.get(cell.lower(), number) for cell, number in cells])
+    return np.array([flags.get(cell.lower(), number) for cell, number in cells])
 
 
 def _by_key(

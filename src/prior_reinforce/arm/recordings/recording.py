@@ -133,21 +133,7 @@ class Recording:
             kept = np.concatenate([[True], ~same])
             times, positions = times[kept], positions[kept]
             remarks += (f"{same.sum()} frames were recorded twice; once is kept",)
-        if np.any(np.diff(times) <= 0):
-            frame = int(np.argmax(np.diff(times) <= 0)) + 1
-            remedy = "sort frames that are out of order; if the clock was set back, leave that "
-            remedy += "episode out"
-            at_rate = "read the frames at their known rate with --time-column none --rate HZ"
-            if np.all(np.diff(times) >= 0):
-                remedy = f"it repeats, as of a coarse clock: {at_rate}, or by another --time-column"
-            elif is_set_back(times, positions):
-                remedy = "the joints go on as if the frames were in order, so it is the times that "
-                remedy += "are wrong, as where a clock was set back, or nanoseconds behind a point "
-                remedy += f"lack their zeros: {at_rate}, or leave that episode out"
-            raise InvalidDemonstrationsError(
-                f"{episode}: time does not increase at frame {frame} ({times[frame - 1]:g} s, then "
-                f"{times[frame]:g} s); {remedy}"
-            )
+        _refuse_disorder(episode, times, positions)
         times -= times[0]
         times.setflags(write=False)
         positions.setflags(write=False)
@@ -182,12 +168,32 @@ def refuse_exchanged(episode: str, positions: Positions) -> None:
         )
 
 
+def _refuse_disorder(episode: str, times: Times, positions: Positions) -> None:
+    """Refuse times that do not increase: InvalidDemonstrationsError says what may be wrong."""
+    steps = np.diff(times)
+    if np.all(steps > 0):
+        return
+    frame = int(np.argmax(steps <= 0)) + 1
+    remedy = "sort frames that are out of order; if the clock was set back, leave that episode out"
+    at_rate = "read the frames at their known rate with --time-column none --rate HZ"
+    if np.all(steps >= 0):
+        remedy = f"it repeats, as of a coarse clock: {at_rate}, or by another --time-column"
+    elif is_set_back(times, positions):
+        remedy = "the joints go on as if the frames were in order, so it is the times that are "
+        remedy += "wrong, as where a clock was set back, or nanoseconds behind a point lack their "
+        remedy += f"zeros: {at_rate}, or leave that episode out"
+    raise InvalidDemonstrationsError(
+        f"{episode}: time does not increase at frame {frame} ({times[frame - 1]:g} s, then "
+        f"{times[frame]:g} s); {remedy}"
+    )
+
+
 def recorded(
     episode: str, clock: Clock, positions: Positions, names: tuple[str, ...] = (), **more: Any
 ) -> Recording:
     """Return a recording at the times of a clock; `more` are further fields."""
-    said = {"clock": clock.source, "ambiguities": clock.ambiguities} | more
-    return Recording(episode, clock.times, positions, names, **said)
+    fields = {"clock": clock.source, "ambiguities": clock.ambiguities} | more
+    return Recording(episode, clock.times, positions, names, **fields)
 
 
 def _without_zeros(positions: Positions) -> tuple[int, int]:
