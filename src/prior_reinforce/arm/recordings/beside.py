@@ -72,9 +72,9 @@ def columns_beside(
     groups = [[others[i] for i in group] for group in vectors(bare).values()]
     in_groups = {i for group in groups for i in group}
     groups += [[i] for i in others if i not in in_groups]
-    called = {say_names([names[i] for i in group]): group for group in groups}
-    arrays = {name: values[:, group] for name, group in called.items()}
-    columns = {name: [names[i] for i in group] for name, group in called.items()}
+    columns_of = {say_names([names[i] for i in group]): group for group in groups}
+    arrays = {name: values[:, group] for name, group in columns_of.items()}
+    columns = {name: [names[i] for i in group] for name, group in columns_of.items()}
     of_motion = [names[i] for i in taken]
     return arrays_beside(values[:, list(taken)], arrays, times, of_motion, columns)
 

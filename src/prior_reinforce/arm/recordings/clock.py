@@ -274,7 +274,7 @@ def clock_from_arrays(
         raise FileFormatError(f"{where} has no array {asked}; it holds {sorted(arrays)}: name one")
     every = {name: (name, array) for name, array in arrays.items()}
     called = [name for name in arrays if split_unit(name, SECONDS)[0] in ARRAY_TIMES]
-    fit = {n: own for n, own in every.items() if own[1].shape == (count,) and n not in motion}
+    fit = {n: (n, a) for n, a in arrays.items() if a.shape == (count,) and n not in motion}
     found = find_times(where, fit | {n: every[n] for n in called}, called, no_motion=True)
     unread = options.rate is not None if asked == NO_COLUMN else asked and found.columns
     declared = None if unread else _rate_among(where, numbers or {}, count, options.rate)

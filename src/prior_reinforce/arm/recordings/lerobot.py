@@ -103,15 +103,15 @@ def read(source: Path, options: ReadOptions) -> Episodes:
                 f"{source}: episode {number} has {len(index)} of {count} listed frames under "
                 "data/; copy the data set again, or name only the other episodes"
             )
-        own = texts[f"{key} names"]
-        said = {"names": own} if len(own) == arrays[key].shape[1] else texts
+        names = texts[f"{key} names"]
+        of_key = {"names": names} if len(names) == arrays[key].shape[1] else texts
         clocks = {n: a.ravel() for n, a in arrays.items() if a.size == len(a) and n not in keys}
         clock = _clock(source, str(number), index, clocks, rate, options)
         arrays = {n: a for n, a in arrays.items() if n != _STAMPS or n in keys}
         of_tasks = (f"its task is {tasks.get(number)!r}",) * (len({*tasks.values()}) > 1)
         also: dict[str, Any] = {"clock": clock, "remarks": (*remarks, *of_tasks)}
         also["stated"] = {name: value for name, value in row.items() if says_success(name)}
-        return recording_of_arrays(source, str(number), keys, arrays, options, texts=said, **also)
+        return recording_of_arrays(source, str(number), keys, arrays, options, texts=of_key, **also)
 
     for number in sorted(listed.keys() | frames.keys()):
         yield str(number), partial(episode_of, number)
@@ -196,8 +196,8 @@ def _listed(source: Path) -> dict[int, dict[str, Any]]:
 
 
 def _task(row: Mapping[str, Any]) -> str:
-    said = row.get(_TASKS) or "not said"
-    return said if isinstance(said, str) else ", ".join(map(str, said))
+    tasks = row.get(_TASKS) or "not said"
+    return tasks if isinstance(tasks, str) else ", ".join(map(str, tasks))
 
 
 def _frames(source: Path, keys: tuple[str, ...]) -> dict[int, Frames]:

@@ -47,28 +47,29 @@ def read(source: Path, options: ReadOptions) -> Episodes:
         if len(paths) > 1 and options.leaves_out(path.stem):
             yield path.stem, unread
         else:
-            arrays = {name: _times(name, own) for name, own in by_field(_arrays(path)).items()}
+            arrays = {name: _times(name, array) for name, array in by_field(_arrays(path)).items()}
             yield from _each(path, arrays, options)
 
 
 def _each(path: Path, arrays: Arrays, options: ReadOptions) -> Episodes:
-    """Every episode of a file, each an array `throw_0`, or frames that an array numbers."""
+    """Yield the episodes of a file: arrays `throw_0`, or frames numbered by an array."""
     numbered = {name: found[1].lower() for name in arrays if (found := _TAKE.fullmatch(name))}
     takes = [n for n, own in numbered.items() if own in EPISODE_COLUMNS and arrays[n].ndim == 2]
     if len(takes) > 1 and not options.key and not any(name in arrays for name in _MOTION_KEYS):
         shared = {name: array for name, array in arrays.items() if name not in takes}
-        told = [name for name in _OUTCOME_KEYS if name in shared]
-        if any(len(np.atleast_1d(shared[name])) != len(takes) for name in told):
-            raise FileFormatError(f"{path}: {told[0]} needs a row for each of {', '.join(takes)}")
+        outcomes = [name for name in _OUTCOME_KEYS if name in shared]
+        if any(len(np.atleast_1d(shared[name])) != len(takes) for name in outcomes):
+            each = ", ".join(takes)
+            raise FileFormatError(f"{path}: {outcomes[0]} needs a row for each of {each}")
         for i, name in enumerate(sorted(takes, key=natural_order)):
-            own = shared | {each: shared[each][i] for each in told}
+            own = shared | {key: shared[key][i] for key in outcomes}
             yield from _episodes(path, {**own, _MOTION_KEYS[0]: arrays[name]}, name, options)
         return
-    said = next((name for name in arrays if name.lower() in EPISODE_COLUMNS), None)
-    if said is None or arrays[said].ndim != 1 or len(set(arrays[said].tolist())) < 2:
+    column = next((name for name in arrays if name.lower() in EPISODE_COLUMNS), None)
+    if column is None or arrays[column].ndim != 1 or len(set(arrays[column].tolist())) < 2:
         yield from _episodes(path, arrays, path.stem, options)
         return
-    numbers, rest = arrays[said], {k: v for k, v in arrays.items() if k != said}
+    numbers, rest = arrays[column], {k: v for k, v in arrays.items() if k != column}
     for number in sorted(set(numbers.tolist())):
         rows = np.flatnonzero(numbers == number)
         own = {k: v[rows] if v.shape[:1] == numbers.shape else v for k, v in rest.items()}
@@ -98,9 +99,7 @@ def _episodes(path: Path, arrays: Arrays, name: str, options: ReadOptions) -> Ep
             f"{path}: outcomes have shape {outcomes.shape}, expected numbers of shape "
             f"({len(motions)}, k)"
         )
-    texts, numbers = read_metadata(
-        {n: array for n, array in arrays.items() if array.dtype.kind in "SU"}
-    )
+    texts, numbers = read_metadata({n: a for n, a in arrays.items() if a.dtype.kind in "SU"})
     names = next((texts[name] for name in ("joint_names", "names") if name in texts), ())
     wrong = len(keys) == 1 and len(set(names)) != (*motions.shape, 1)[2]
 
@@ -110,11 +109,11 @@ def _episodes(path: Path, arrays: Arrays, name: str, options: ReadOptions) -> Ep
             for name, array in arrays.items()
             if array.dtype.kind in "biuf" and name not in _OUTCOME_KEYS
         }
-        said: dict[str, Any] = {"texts": texts, "stated": {**numbers, **own}}
-        said |= {"outcome": None if outcomes is None else outcomes[index]}
-        said |= {"names": names if wrong else ()}
+        of_file: dict[str, Any] = {"texts": texts, "stated": {**numbers, **own}}
+        of_file |= {"names": names if wrong else ()}
+        of_file |= {"outcome": None if outcomes is None else outcomes[index]}
         there = {name: array for name, array in own.items() if array.ndim > 0}
-        yield episode, partial(recording_of_arrays, path, episode, keys, there, options, **said)
+        yield episode, partial(recording_of_arrays, path, episode, keys, there, options, **of_file)
 
 
 def _arrays(path: Path) -> Arrays:

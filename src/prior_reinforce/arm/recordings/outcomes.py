@@ -219,26 +219,27 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
     other = (*_NOT_COMPONENTS, *ROW_COLUMNS)
     texts = [i for i, cells in enumerate(table.cells) if cells and _is_text(cells)]
     columns = [i for i, name in enumerate(lower) if i not in (key, *texts) and name not in other]
-    meant = columns_of(names or (), [split[i][0] for i in columns])
-    if meant and all(meant.values()):  # others may hold anything
-        own = {i for each in meant.values() for i, _ in each}
-        exact = {i for i in own if split[columns[i]][0] in meant}
-        columns = [columns[i] for i in sorted(exact if len(exact) == len(meant) else own)]
-    kept = [split[i][0] for i in columns]
+    matches = columns_of(names or (), [split[i][0] for i in columns])
+    if matches and all(matches.values()):  # others may hold anything
+        fitting = {i for each in matches.values() for i, _ in each}
+        exact = {i for i in fitting if split[columns[i]][0] in matches}
+        columns = [columns[i] for i in sorted(exact if len(exact) == len(matches) else fitting)]
+    components = [split[i][0] for i in columns]
     spreads = [
         name
         for i, name in enumerate(lower)
-        if name != SD and kept and i not in columns and _UNCERTAINTY.fullmatch(name)
+        if name != SD and components and i not in columns and _UNCERTAINTY.fullmatch(name)
     ]
     if spreads:
         raise FileFormatError(
             f"{path} says uncertainties in {', '.join(spreads)}, but a row has one, in a column "
             f"{SD}: write the largest of each row there, and take the others out"
         )
-    left_out = other_places(path, meant, [n for i, (n, _) in enumerate(split) if i not in columns])
-    twice = next((own for own in kept if kept.count(own) > 1), None)
+    rest = [name for i, (name, _) in enumerate(split) if i not in columns]
+    left_out = other_places(path, matches, rest)
+    twice = next((name for name in components if components.count(name) > 1), None)
     if key is None or not columns or twice:
-        both = [table.names[i] for i, own in zip(columns, kept, strict=True) if own == twice]
+        both = [table.names[i] for i in columns if split[i][0] == twice]
         why = f": {' and '.join(both)} are all {twice}; keep one" * bool(both)
         if key is None and table.named:
             why = ": none of these names the recordings; call the one that does so episode"
@@ -265,7 +266,7 @@ def read_outcomes(path: Path, names: Sequence[str] | None = None) -> Outcomes:
         rows,
         values * scale,
         sds if sd_unit else scale[0] * sds,
-        tuple(kept),
+        tuple(components),
         tuple(base_of(unit)[0] if unit else None for unit in units),
         sd_unit,
         sources=() if source is None else tuple(table.cells[source]),

@@ -97,7 +97,7 @@ def select(
         if units is not None and len(units) == len(joints):
             units = [units[i] for i in find_channels(names, joints) or ()]
         joints = tuple(names)
-    unnamed = names is not None and tuple(names) == joints
+    unnamed = names is not None and tuple(names) == joints  # the user names no recorded joints
     names = tuple(names) if names is not None else joints
     if plan_units is not None and len(plan_units) == 1:
         plan_units = tuple(plan_units) * len(names)
@@ -129,11 +129,12 @@ def select(
     picked = [_picked(*each, joints) for each in zip(recordings, columns, strict=True)]
     takes, stated, mixed, unsaid = in_one_unit(picked, names, stated)
     beliefs = beliefs_of(takes, names, stated, plan_units)
-    told = [[r.units[i] is not None for r in picked] for i in range(len(names))]
-    # What some files state and others do not is asked about anyway, unless it is given.
-    open_ = [b for b, own in zip(beliefs, told, strict=True) if not (all if given else any)(own)]
-    odd, differ = odd_takes(open_)
-    silent, fixed = not any(map(any, told)), plan_units is not None
+    states = [[r.units[i] is not None for r in picked] for i in range(len(names))]
+    # A unit that only some files state is asked about anyway, unless the user gives it.
+    enough = all if given else any
+    unsettled = [b for b, own in zip(beliefs, states, strict=True) if not enough(own)]
+    odd, differ = odd_takes(unsettled)
+    silent, fixed = not any(map(any, states)), plan_units is not None
     judge = Judge([b.without(odd) for b in beliefs], given, silent, fixed, normalised)
     questions, (remarks, other) = judge.questions(), judge.remarks()
     if given:

@@ -45,18 +45,18 @@ _THOUSAND = re.compile(r"\d{1,3}([.,]\d{3})+")
 
 def _declared(table: Table, options: ReadOptions) -> DeclaredRate | None:
     """The frame rate that comments or a column of one number declare."""
-    said = {
-        name: float(own[0])
-        for name, own in zip(table.names, table.values.T, strict=True)
-        if len(own) > 1 and np.ptp(own) == 0 and not _OF_ANYTHING.fullmatch(name)
+    stated = {
+        name: float(numbers[0])
+        for name, numbers in zip(table.names, table.values.T, strict=True)
+        if len(numbers) > 1 and np.ptp(numbers) == 0 and not _OF_ANYTHING.fullmatch(name)
     }
     for line in table.comments:
         for name, number, unit in _SAYS.findall(line):
             of_time = known_unit(unit) in SECONDS
             if of_time or unit.lower() in ("", "hz", "khz", "fps"):
                 scale = 1000 if unit.lower() == "khz" else 1
-                said[f"{name}_{unit}" if of_time else name] = float(number) * scale
-    return declared_rate(table.where, said, options.rate)
+                stated[f"{name}_{unit}" if of_time else name] = float(number) * scale
+    return declared_rate(table.where, stated, options.rate)
 
 
 def with_whole_dates(table: Table) -> Table:

@@ -68,37 +68,37 @@ def in_one_unit(
     doubts about those of which only some files state a unit. ConfigurationError if a file states
     another unit than the given one; InvalidDemonstrationsError if two units cannot be converted.
     """
-    scale, stated = np.ones((len(recordings), len(names))), list[str | None]()
+    scale, units = np.ones((len(recordings), len(names))), list[str | None]()
     remarks, doubts = list[str](), []
-    words: dict[tuple[str, str, str], list[str]] = {}
+    renamed: dict[tuple[str, str, str], list[str]] = {}
     for i, (name, unit) in enumerate(zip(names, given, strict=True)):
         takes: dict[str, list[Recording]] = {}
         for recording in recordings:
             takes.setdefault(recording.units[i] or "", []).append(recording)
         silent = takes.pop("", [])
-        called = {own: _called(of_unit) for own, of_unit in takes.items()}
+        where = {stated: _episodes(of_unit) for stated, of_unit in takes.items()}
         first = next(iter(takes), None)
-        said = unit and (known_unit(unit) or unit)
-        stated.append(said or first)
-        for own, of_unit in takes.items():
-            by = factor(own, said or str(first))
-            of_one, number = without_number(said or "")
-            told = number != 1 or not spelt(without_number(own)[0])
-            if said is not None and by is None and told and spelt(of_one):
+        asked = unit and (known_unit(unit) or unit)
+        units.append(asked or first)
+        for stated, of_unit in takes.items():
+            by = factor(stated, asked or str(first))
+            of_one, number = without_number(asked or "")
+            may_rename = number != 1 or not spelt(without_number(stated)[0])
+            if asked is not None and by is None and may_rename and spelt(of_one):
                 by = 1.0  # `Grad`, which is no listed unit; or m, of which one is 1250 percent
-                words.setdefault((own, called[own], said), []).append(name)
-            elif said not in (None, own):
+                renamed.setdefault((stated, where[stated], asked), []).append(name)
+            elif asked not in (None, stated):
                 raise ConfigurationError(
-                    f"{of_unit[0].columns[i]} of episode {of_unit[0].episode} is in {own}, but "
-                    f"--units says {said}; correct or drop it"
+                    f"{of_unit[0].columns[i]} of episode {of_unit[0].episode} is in {stated}, but "
+                    f"--units says {asked}; correct or drop it"
                 )
             if by is None:
                 raise InvalidDemonstrationsError(
-                    f"{name} is in {first} in {called[str(first)]}, but in {own} in {called[own]}; "
-                    "correct what is wrong, or leave it out (--leave-out)"
+                    f"{name} is in {first} in {where[str(first)]}, but in {stated} in "
+                    f"{where[stated]}; correct what is wrong, or leave it out (--leave-out)"
                 )
-            scale[[r.units[i] == own for r in recordings], i] = by
-        each = ", ".join(f"in {own} in {where}" for own, where in called.items())
+            scale[[r.units[i] == stated for r in recordings], i] = by
+        each = ", ".join(f"in {stated} in {episodes}" for stated, episodes in where.items())
         if len(takes) > 1:
             remarks.append(f"{name} is {each}, as they state: each is converted")
         if takes and silent:
@@ -107,22 +107,22 @@ def in_one_unit(
                 max(np.abs(r.positions[:, i]).max() for r in of) for of in (silent, stating)
             )
             what = (
-                f"{name} is {each} (up to {there:.4g}), and {_called(silent)} states no unit (up "
+                f"{name} is {each} (up to {there:.4g}), and {_episodes(silent)} states no unit (up "
                 f"to {here:.4g}): state it there, or leave out"
             )
             doubts.append(_without(what, [r.episode for r in min(silent, stating, key=len)]))
-    scaled = [
+    converted = [
         replace(r, positions=r.positions * by) if np.any(by != 1) else r
         for r, by in zip(recordings, scale, strict=True)
     ]
-    as_said = [
-        f"{say_names(of)} recorded in {own} in {where}, taken for {said}, as said"
-        for (own, where, said), of in words.items()
+    as_asked = [
+        f"{say_names(channels)} recorded in {stated} in {episodes}, taken for {asked}, as said"
+        for (stated, episodes, asked), channels in renamed.items()
     ]
-    return scaled, stated, [*as_said, *remarks], doubts
+    return converted, units, [*as_asked, *remarks], doubts
 
 
-def _called(recordings: Sequence[Recording]) -> str:
+def _episodes(recordings: Sequence[Recording]) -> str:
     return say_names([recording.episode for recording in recordings])
 
 

@@ -92,8 +92,8 @@ def read(source: Path, options: ReadOptions) -> Episodes:
             for name, array in numbers.items()
         }
         also = {name: array[i] for name, array in of_each.items()}
-        said: dict[str, Any] = {"texts": texts, "stated": stated | also}
-        yield str(i), partial(recording_of_arrays, source, str(i), keys, own, options, **said)
+        of_file: dict[str, Any] = {"texts": texts, "stated": stated | also}
+        yield str(i), partial(recording_of_arrays, source, str(i), keys, own, options, **of_file)
 
 
 def _numbers(source: Path, group: Any, arrays: Arrays, name: str) -> Stamps:
