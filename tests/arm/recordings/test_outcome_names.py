@@ -5,6 +5,7 @@ import pytest
 from prior_reinforce.arm.recordings.outcome_names import (
     columns_of,
     digits_at_end,
+    how_to_renumber,
     keys_of,
     number_of,
     order_of,
@@ -207,3 +208,9 @@ def test_columns_that_are_no_outcomes_by_their_names_are_left_out(tmp_path):
     assert other_places(tmp_path, ["x", "y"], others) == others
     assert other_places(tmp_path, ["x", "y"], ["note_x2", "note_y2"]) == ["note_x2", "note_y2"]
     assert other_places(tmp_path, ["angle"], ["elbow_angle"]) == ["elbow_angle"]
+
+
+def test_rows_with_whole_names_of_some_episodes_are_not_to_be_numbered_anew():
+    takes = ["take-1", "take-2", "take-3"]
+    assert how_to_renumber("", takes, ["take-2", "take-3"]) == ""
+    assert "renumber it" in how_to_renumber("", takes, ["throw-2", "throw-3"])

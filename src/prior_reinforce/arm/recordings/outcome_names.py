@@ -221,7 +221,8 @@ def how_to_renumber(word: str, episodes: Sequence[str], rows: Sequence[str]) -> 
     """Say what to do where rows may be numbered otherwise than the episodes; else empty."""
     ours = [number_of(name, word) for name in episodes]
     theirs = [digits_at_end(name) for name in rows]
-    if not (all(theirs) and ours and theirs):
+    called = {*rows} <= {*episodes} and not any(map(str.isdigit, rows))  # by their whole names
+    if called or not (all(theirs) and ours and theirs):
         return ""
     unlike = not all(ours) or min(map(int, ours)) == min(map(int, theirs))
     counted = sorted(map(int, theirs))
