@@ -666,13 +666,21 @@ def test_centimetres_that_can_be_nothing_else_are_read(text, place):
     assert read_place(text, OutcomeFormat.metres(2), SHOWN) == pytest.approx(place)
 
 
-@pytest.mark.parametrize("text", ["5cm -2cm", "5 cm, -2 cm", "50mm -0.02m"])
-def test_an_error_may_be_numbers_with_units_in_order(text):
-    reading = from_words(text, OutcomeFormat.metres(2))
-    assert reading.error_seen == pytest.approx([0.05, -0.02])
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("92cm ahead, 0.1 left", [[0.9, 0.0]]),  # straight ahead
+        ("0.8 -20cm", 0.0),  # where nothing was shown
+        ("1.0 ahead, 0.2 right", 0.0),
+    ],
+)
+def test_a_decimal_number_is_asked_about_whatever_was_shown_of_its_component(text, shown):
+    with pytest.raises(InvalidFeedbackError, match="has no unit; say"):
+        read_place(text, OutcomeFormat.metres(2), shown)
 
 
-@pytest.mark.parametrize("text", ["0.05 -2cm", "5cm", "5cm - 2cm"])
-def test_an_error_in_numbers_has_a_unit_each(text):
-    with pytest.raises(InvalidFeedbackError, match="cannot read"):
-        from_words(text, OutcomeFormat.metres(2))
+def test_the_unit_of_the_last_number_is_that_of_all_where_the_outcomes_is_smaller():
+    shown = [[900.0, 100.0]]
+    place = read_place("92 10 cm", OutcomeFormat(("x", "y"), ("mm", "mm")), shown)
+    assert place == pytest.approx([920.0, 100.0])
+    assert read_place("80 -20.5 cm", OutcomeFormat.metres(2)) == pytest.approx([0.8, -0.205])

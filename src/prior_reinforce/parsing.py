@@ -65,8 +65,7 @@ def from_words(text: str, form: OutcomeFormat | None = None) -> Reading:
     A length without a unit is in centimetres, or in the outcome's inches; a component that is not
     named is zero. 0, 2, 5 cm and tens are an observer's words (`Reading.by_eye`), other numbers
     estimates (`Reading.estimated`), `5 +- 0.5 cm long` is a measurement. `long` means by 1 cm or
-    more, and leaves components that are not named unknown; so does `5 cm long, somewhere`. Numbers
-    with units alone are outcome minus goal, in order (`5cm -2cm`). `hit`
+    more, and leaves components that are not named unknown; so does `5 cm long, somewhere`. `hit`
     and `miss` stand alone or beside terms; `lost` alone: nobody saw where the object went.
 
     Args:
@@ -110,11 +109,8 @@ def from_words(text: str, form: OutcomeFormat | None = None) -> Reading:
 
 
 def _by_name(text: str, form: OutcomeFormat) -> list[float] | None:
-    """Read an error as `x +5 cm, t -0.1 s` or `5cm -2cm`; None if it is no such text."""
-    text = text.replace("\u2212", "-")
-    values = values_by_name(text, form.names)
-    if values is None and form.outcome_dim > 1 and not unit_of_all(text, form.units):
-        values = text
+    """Read an error as `to_words` may print it, `x +5 cm, t -0.1 s`; None if it is no such text."""
+    values = values_by_name(text.replace("\u2212", "-"), form.names)
     if values is None or read_numbers(values) is not None:  # without units
         return None
     numbers = _numbers_with_units(with_points(values, form.outcome_dim), form.units)
@@ -239,7 +235,7 @@ def read_place(text: str, form: OutcomeFormat, shown: ArrayLike = 0.0) -> Point:
     For instance `0.92 0.10`, `92cm 10cm`, `92 10 cm`, `x 92cm, y 10cm`, or `92cm ahead, 10cm left`;
     beside words, a number without one is the component in that position: `92cm, 10cm left`. `shown`
     as for `as_place`. InvalidFeedbackError if it is none of these, has a `+-`, is farther than any
-    arm throws, or has a number without a unit that may be in two of them (`1.05 10cm`).
+    arm throws, or nobody knows the unit of a number (`1.05 10cm`).
     """
     if re.search(PLUS_MINUS, text):
         raise InvalidFeedbackError(f"cannot read {text!r} as one place; leave out the +-")
@@ -261,8 +257,7 @@ def read_place(text: str, form: OutcomeFormat, shown: ArrayLike = 0.0) -> Point:
             [terms[j].sign * (terms[j].size or 0.0) if j in terms else 0.0 for j in range(k)]
         )
         bare = {j: bare_unit(form.units[j]) for j, term in terms.items() if not term.stated}
-        _refuse_unclear(place, bare, form, shown, text)
-        return place
+        return _with_clear_units(place, bare, form, shown, text)
     if len(numbers) != k or not all(map(math.isfinite, numbers)):
         raise InvalidFeedbackError(f"{text!r} is not {expected}; give those")
     stated = read_numbers(text) is None
@@ -278,25 +273,30 @@ def read_place(text: str, form: OutcomeFormat, shown: ArrayLike = 0.0) -> Point:
         raise InvalidFeedbackError(f"{say_too_large(number, unit, stated)}; {remedy}")
     shared = unit_of_all(text, form.units)
     bare = dict.fromkeys(range(k - 1), shared) if shared else {}
-    _refuse_unclear(np.array(numbers), bare, form, shown, text)
-    return np.array(numbers)
+    return _with_clear_units(np.array(numbers), bare, form, shown, text)
 
 
-def _refuse_unclear(
+def _with_clear_units(
     place: Point, bare: dict[int, str], form: OutcomeFormat, shown: ArrayLike, text: str
-) -> None:
-    """Refuse numbers without a unit that were read in one, and may be in the outcome's own.
+) -> Point:
+    """Return a place, unless its numbers without a unit may be in the outcome's own, larger unit.
 
-    `bare` holds the unit in which each such component was read. In the outcome's own unit they may
-    be, if all of them then lie no farther than twice what was `shown`.
+    `bare` holds the unit in which each was read. They may be, if none then is more than twice what
+    was `shown` of it, or, with a decimal point, of any component in that unit (if any was).
     """
-    own = {j: place[j] / (factor(unit, form.units[j]) or 1.0) for j, unit in bare.items()}
-    as_typed = np.array([own.get(j, 0.0) for j in range(len(place))])
-    differ = [j for j, number in own.items() if number and bare[j] != form.units[j]]
-    if differ and not np.any(_beyond(as_typed, shown)):
-        number, units = own[differ[0]], (bare[differ[0]], form.units[differ[0]])
-        both = " or ".join(f"{number:g}{unit}" for unit in units)
-        raise InvalidFeedbackError(f"{text!r}: {number:g} has no unit; say {both}")
+    largest = np.broadcast_to(np.max(np.abs(np.atleast_2d(shown)), axis=0), place.shape)
+    pointed, doubt = re.search(r"\d*\.\d", text), ""
+    for j, unit in bare.items():
+        own, scale = form.units[j], factor(unit, form.units[j]) or 1.0
+        number, alike = place[j] / scale, largest[[other == own for other in form.units]].max()
+        limit = 2.0 * (alike if pointed else largest[j])
+        if abs(number) > limit and (alike or not pointed or looks_like(own, number)):
+            return place
+        if number and scale < 1.0 and not doubt:
+            doubt = f"{number:g} has no unit; say {number:g}{unit} or {number:g}{own}"
+    if doubt:
+        raise InvalidFeedbackError(f"{text!r}: {doubt}")
+    return place
 
 
 def _beyond(numbers: ArrayLike, shown: ArrayLike) -> Point:

@@ -83,11 +83,12 @@ def test_the_import_that_is_named_after_skipping_works_as_it_is_typed(
     run, folder, tmp_path, monkeypatch
 ):
     recordings(tmp_path / "two throws", outcomes=[])
-    typing(monkeypatch, ["skip", "0.8 0.2", "1.0 -0.2", "1.0 0.2"])
-    status, out, _ = run("import", folder, "two throws")
-    assert status == 0
+    typing(monkeypatch, ["0.8 20cm", "skip", "1.0 -0.2", "0.9 0.2"])
+    status, out, err = run("import", folder, "two throws", "--leave-out", "throw_0")
+    assert "0.8 has no unit; say 0.8cm or 0.8m" in out
+    assert status == 0, err
     (command,) = re.findall(r"; again: prior-reinforce (.*)", out)
     monkeypatch.setattr("sys.stdin.isatty", lambda: False)
     assert run(*shlex.split(command))[0] == 0
     with Workspace(folder) as workspace:
-        assert workspace.demonstrations.n == 3
+        assert workspace.demonstrations.n == 2

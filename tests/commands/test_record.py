@@ -49,7 +49,7 @@ def test_takes_by_the_clock_end_in_the_workspace(run, folder):
 
 def test_the_import_that_is_to_be_typed_next_names_the_recordings(run, folder, monkeypatch):
     def propose(command, workspace, source):
-        print(command._command("--smooth 5"))
+        print(command.as_typed("--smooth 5"))
 
     monkeypatch.setattr(Import, "read_into", propose)
     _, said, _ = run("record", folder, *BY_CLOCK, "--append")
@@ -129,7 +129,8 @@ def test_an_arm_that_is_unplugged_keeps_what_was_recorded(run, folder, tmp_path)
     name_arm(folder, tmp_path / "arm", kind="unplugged")
     _, _, refused = run("record", folder, *BY_CLOCK[:3], "0.2", "--pause", "0.1")
     assert "does not answer any more" in refused
-    assert f"take-1; next: prior-reinforce import {folder} {folder}/recordings/1" in refused
+    command = f"import {folder} {folder}/recordings/1 --format npz --units rad rad\n"
+    assert f"take-1; next: prior-reinforce {command}" in refused
     assert (folder / "recordings/1/take-1.npz").is_file()
 
 
@@ -197,7 +198,13 @@ def test_a_take_is_kept_without_a_picture_where_none_can_be_written(
 
 
 @pytest.mark.parametrize(
-    ("named", "why"), [("a/b", "is no name"), (".a", "is no name"), ("take-1", "is a take-1")]
+    ("named", "why"),
+    [
+        ("a/b", "is no name"),
+        (".a", "is no name"),
+        (300 * "a", "is no name"),
+        ("take-1", "is a take-1"),
+    ],
 )
 def test_a_name_that_cannot_be_given_is_refused_with_its_reason(session, capsys, named, why):
     take(session)
@@ -211,6 +218,7 @@ def test_takes_before_an_interruption_are_named_with_their_import(run, folder, m
         raise KeyboardInterrupt
 
     monkeypatch.setattr(Import, "read_into", interrupt)
-    status, _, err = run("record", folder, *BY_CLOCK)
+    status, _, err = run("record", folder, *BY_CLOCK, "--append")
     assert status == 130
-    assert f"take-4; next: prior-reinforce import {folder} {folder}/recordings/1" in err
+    command = f"import {folder} {folder}/recordings/1 --format npz --units rad rad --append\n"
+    assert f"take-4; next: prior-reinforce {command}" in err

@@ -124,7 +124,7 @@ class Import(OnWorkspace):
                 self._import(workspace, wanted, recordings, selection)
         except UnclearUnitsError as error:
             also = f"{error.also}; and " if error.also else ""
-            command = self._command(error.options)
+            command = self.as_typed(error.options)
             raise ConfigurationError(f"{also}{error.problem}; if so: {command}") from error
 
     def _import(
@@ -140,8 +140,9 @@ class Import(OnWorkspace):
             if answers is not None:
                 known, skipped = answers, missing_outcomes(selection.episodes, answers)
                 again = f"--outcomes {shlex.quote(str(answers.where))}"
-                left = f"--leave-out {shlex.join(skipped)}" * bool(skipped)
-                print(f"outcomes kept in {answers.where}; again: {self._command(again, left)}")
+                left = [*(self.options.leave_out or ()), *skipped]
+                left_out = f"--leave-out {shlex.join(left)}" * bool(left)
+                print(f"outcomes kept in {answers.where}; again: {self.as_typed(again, left_out)}")
                 selection = selection.without(skipped)
                 if not selection.recordings:
                     raise InvalidDemonstrationsError("no episode is left; import again")
@@ -151,7 +152,7 @@ class Import(OnWorkspace):
         if remedy and self.append:  # kept, it would stay beside what the remedy makes of it
             raise InvalidDemonstrationsError(
                 f"the gate refuses all of these, and nothing was appended; run: "
-                f"{self._command(remedy)}"
+                f"{self.as_typed(remedy)}"
             )
         n_before = workspace.take_in(result, str(recordings.source), append=self.append)
         if n_before:
@@ -164,7 +165,7 @@ class Import(OnWorkspace):
         except WorkspaceError as error:  # the demonstrations are taken in without it
             warn(f"no picture: {error}")
         if remedy:
-            print(f"next: {self._command(remedy)}")
+            print(f"next: {self.as_typed(remedy)}")
         else:
             print_next(workspace)
 
@@ -185,7 +186,7 @@ class Import(OnWorkspace):
                 write_outcome_table(table, rows, names, units)
             said = f"none yet; fill in {table} (units are in its first line)"
         options = " ".join(dict.fromkeys(one.option for one in unclear))
-        command = self._command(options, found.remedy)
+        command = self.as_typed(options, found.remedy)
         if self.json:
             record = InspectView(
                 source=str(recordings.source),
@@ -205,7 +206,7 @@ class Import(OnWorkspace):
         print(plain(f"\noutcomes: {said}", keep="\n"))
         print(f"nothing was taken in; next: {command}")
 
-    def _command(self, *options: str) -> str:
+    def as_typed(self, *options: str) -> str:
         """The whole command as given, with further options that replace or join those given."""
         more = " ".join(filter(None, options))
         own = options_of(self, without=("words", "inspect", "json", "options"))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import select
-import shlex
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -24,7 +23,6 @@ from prior_reinforce.arm.recordings.options import ReadOptions
 from prior_reinforce.arm.recordings.outcomes import OUTCOMES_FILE, Place, keep_places
 from prior_reinforce.arm.workspace.folder import RECORDINGS
 from prior_reinforce.arm.workspace.manifest import Manifest
-from prior_reinforce.arm.workspace.text import call
 from prior_reinforce.arm.workspace.workspace import Workspace
 from prior_reinforce.commands import warn
 from prior_reinforce.commands.base import OnWorkspace
@@ -34,7 +32,6 @@ from prior_reinforce.commands.questions import agrees
 from prior_reinforce.errors import (
     ConfigurationError,
     InvalidDemonstrationsError,
-    PriorReinforceError,
 )
 from prior_reinforce.files import named_disk_errors
 from prior_reinforce.plans.plan_format import PlanFormat
@@ -45,6 +42,8 @@ _MOTIONS: tuple[Which, ...] = ("measured", "commanded")
 _SUFFIXES = (".npz", ".png")
 _FEWEST = 10
 """States of a take; ours: a tenth of a second, which nobody means."""
+_LONGEST_NAME = 200
+"""Of a take, in bytes; ours: file systems take 255, its ending included."""
 _SILENT = 10.0
 """How long an arm may be silent, in [s]; ours."""
 _QUESTIONS: dict[Guiding, tuple[str, str]] = {
@@ -119,8 +118,10 @@ class Record(OnWorkspace):
             session = _Session(manifest, folder, channels, self.motion, terminal, asks)
             then = "it follows its leader" if guiding == "led" else "move it by hand"
             print(f"reading {watch.arm.model}; {then} now", flush=True)
-            again = call(workspace.folder, "import", shlex.quote(str(folder)))
-            with _said_if_ended(session, again, KeyboardInterrupt, PriorReinforceError):
+            options = ReadOptions(format="npz", units=manifest.format.units)
+            words = (str(workspace.folder), str(folder))
+            imports = Import(words=words, options=options, append=self.append)
+            with _said_if_it_fails(session, imports):
                 if asks:
                     _by_keys(watch, session)
                 else:
@@ -131,10 +132,8 @@ class Record(OnWorkspace):
             with suppress(OSError):
                 folder.rmdir()
             raise InvalidDemonstrationsError("nothing was recorded; record again")
-        options = ReadOptions(format="npz", units=manifest.format.units)
-        words = (str(workspace.folder), str(folder))
-        with _said_if_ended(session, again, KeyboardInterrupt):
-            Import(words=words, options=options, append=self.append).read_into(workspace, folder)
+        with _said_if_it_fails(session, imports, KeyboardInterrupt):
+            imports.read_into(workspace, folder)
 
     def _by_the_clock(self, watch: Watch, session: _Session) -> None:
         """Wait, take, end, by the arm's own time."""
@@ -170,13 +169,16 @@ def _by_keys(watch: Watch, session: _Session) -> None:
 
 
 @contextmanager
-def _said_if_ended(session: _Session, again: str, *by: type[BaseException]) -> Iterator[None]:
-    """Say which takes are kept, and how they are imported, where recording is ended by an error."""
+def _said_if_it_fails(
+    session: _Session, imports: Import, by: type[BaseException] = BaseException
+) -> Iterator[None]:
+    """Say which takes are kept, and how they are imported, where recording ends early."""
     try:
         yield
     except by:
         if session.taken:
-            warn(f"kept in {session.folder}: {', '.join(session.taken)}; next: {again}")
+            kept = ", ".join(session.taken)
+            warn(f"kept in {session.folder}: {kept}; next: {imports.as_typed()}")
         raise
 
 
@@ -267,16 +269,17 @@ class _Session:
         old = [*self.taken][-1]
         new = plain(self.terminal.line(f"another name for {old}: ")).strip()
         why = ""
-        if "/" in new or new.startswith("."):
-            why = f": {new} is no name of a file"
+        if "/" in new or new.startswith(".") or len(new.encode()) > _LONGEST_NAME:
+            why = f": {new:.40} is no name of a file"
         elif new and (self.folder / f"{new}.npz").exists():
             why = f": there is a {new} already"
         if why or not new:
             print(f"it stays {old}{why}", flush=True)
             return
         for suffix in _SUFFIXES:
-            with suppress(FileNotFoundError):  # there may be no picture
-                (self.folder / f"{old}{suffix}").rename(self.folder / f"{new}{suffix}")
+            path = self.folder / f"{old}{suffix}"
+            if path.exists() or suffix != ".png":  # there may be no picture
+                path.rename(self.folder / f"{new}{suffix}")
         self.taken[new] = self.taken.pop(old)
         if self.taken[new] is not None:
             self._keep()

@@ -17,6 +17,7 @@ from prior_reinforce.arm.workspace.text import (
     next_step,
     say_left_out,
     say_outdated,
+    say_told,
     say_trial,
     tell_example,
 )
@@ -83,7 +84,7 @@ class Seen(OnWorkspace):
 
     def _say_told(self, now: Standing, trial: Trial, words: tuple[str, ...]) -> str:
         """What was told as it was understood, and that numbers had no unit, if so."""
-        said, reading, goal = say_trial(now, trial), trial.reading, now.state.goal_of(trial)
+        said, reading, goal = say_told(now, trial), trial.reading, now.state.goal_of(trial)
         assert reading is not None
         if understood := say_understood(reading, goal.format):
             said += f"; understood as {understood}"

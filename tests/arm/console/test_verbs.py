@@ -377,8 +377,18 @@ def test_an_arm_that_stands_elsewhere_is_asked_to_go_to_the_start_first(on_arm):
     assert asked.question.startswith(
         "The arm will move slowly to where trial 1 begins (1.9 s). NOT"
     )
-    verbs.execute(execution(state, motion="approach"))
+    with pytest.raises(TrialStateError, match="prepare it again"):
+        verbs.execute(execution(state, motion="approach"))
+    (arm / "pose").write_text("0.0 0.9")  # by somebody, while it is asked about
+    verbs.execute(execution(state, motion="approach", stood=asked.stood))
     wait_for(lambda: kinds(verbs.folder)[-1] == "moved")
+    state = verbs.state()
+    assert "from where it stood when a person was asked" in state.trials[0].warning
+    asked = verbs.question(execution(state))
+    verbs.execute(execution(state, motion="approach", stood=asked.stood))
+    wait_for(
+        lambda: kinds(verbs.folder)[-2:] == ["moving", "moved"] and verbs.state().id > state.id + 1
+    )
     state = verbs.state()
     assert (state.step, state.trials[0].warning) == ("execute", None)
     assert verbs.question(execution(state)).motion == "trial"

@@ -27,7 +27,7 @@ from prior_reinforce.arm.executing.drive import (
     say_distance,
 )
 from prior_reinforce.arm.robots.gate_settings import GateSettings
-from prior_reinforce.arm.robots.limits import RobotLimits
+from prior_reinforce.arm.robots.limits import ENDLESS, RobotLimits
 from prior_reinforce.arm.robots.plan_files import write_plan
 from prior_reinforce.arm.robots.presets import robot_limits
 from prior_reinforce.errors import (
@@ -69,8 +69,8 @@ def arm(tmp_path, toy_plugin):
             self.result.mkdir()
             return drive(self.request(motion, speed, **options), plan, self.result)
 
-        def look(self):
-            assert self.drive("look").outcome == "done"
+        def look(self, plan=PLAN):
+            assert self.drive("look", plan).outcome == "done"
             return read_look(self.result)
 
         def motions(self):
@@ -225,7 +225,7 @@ def test_a_look_moves_nothing_and_says_how_the_arm_stands(arm):
     arm.stands(0.2, 0.3)
     arm.drive("look", fastest=0.1)
     look = read_look(arm.result)
-    assert look.pose == {"arm_joint2": 0.3, "arm_joint1": 0.2}
+    assert look.pose == {"joint1": 0.2, "joint2": 0.3}
     assert not look.there
     assert "; 0.02 is allowed" in look.said
     assert "more than 0.1" in look.refused
@@ -462,7 +462,39 @@ def test_an_approach_begins_where_the_arm_stood_when_a_person_was_asked(arm):
     arm.stands(1.5, 0.2)
     result = arm.drive("approach")
     assert result.outcome == "not_moved"
-    assert re.search(r"1 rad \(arm_joint1\) from where it stood .*: ask again", result.reason)
+    assert re.search(r"1 rad \(joint1\) from where it stood .*: ask again", result.reason)
     assert arm.motions() == 0
     arm.stands(0.5001, 0.2)  # what an encoder shows at rest
     assert arm.drive("approach").outcome == "done"
+
+
+@pytest.mark.parametrize("motion", ["trial", "approach"])
+def test_a_channel_that_the_plan_leaves_out_stands_where_a_person_saw_it(arm, motion):
+    only = Plan(PLAN.actions[:, :1], PlanFormat(FORM.names[:1], ("rad",), 0.02))
+    arm.stands(0.5, 0.0)
+    arm.stood = arm.look(only).pose
+    arm.stands(1.9, 0.0)
+    result = arm.drive(motion, only)
+    assert (result.outcome, arm.motions()) == ("not_moved", 0)
+    assert "1.4 rad (joint1) from where it stood" in result.reason
+
+
+def test_a_joint_at_the_seam_of_a_turn_stands_where_it_stood(arm):
+    ends = {"lower": np.full(2, -ENDLESS), "upper": np.full(2, ENDLESS)}
+    arm.limits = RobotLimits("own", "", "", ("joint1", "joint2"), **ends, velocity=np.full(2, 9.0))
+    arm.stands(3.1415, 0.0)
+    arm.stood = arm.look().pose
+    arm.stands(-3.1416, 0.0)
+    assert "from where it stood" not in arm.drive("approach").reason
+
+
+def test_a_throw_is_done_whatever_fails_after_it(arm, monkeypatch):
+    def full(*_, **__):
+        raise OSError("No space left on device")
+
+    monkeypatch.setattr(toy_arm.ToyArm, "close", full)
+    monkeypatch.setattr(np, "savez", full)
+    result = arm.drive()
+    assert result.outcome == "done"
+    assert "is not kept: No space left" in result.reason
+    assert "it was not let go" in result.reason

@@ -102,7 +102,7 @@ class Question(Struct):
     refused: str = ""
     """Why the arm refuses the plan; empty if it does not."""
     stood: dict[str, float] = {}
-    """Where each of the plan's columns stands."""
+    """Where each of the arm's channels stands."""
 
 
 class Reached(Struct):
@@ -246,6 +246,8 @@ class Verbs:
             stage = self.workspace.state.stage(trial)
             if stage != "asked" or self._is_running():
                 raise TrialStateError(f"trial {trial.number} is {stage} already")
+            if body.motion == "approach" and not body.stood:
+                raise TrialStateError("nobody was asked where the arm stands; prepare it again")
             stop_seen, began = last_stop(self.folder), len(self.workspace.events)
             if body.stopped != str(stop_seen):
                 raise TrialStateError("somebody pressed Stop since; look again")

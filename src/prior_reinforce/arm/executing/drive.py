@@ -64,7 +64,6 @@ _SLOW: Mapping[Kind, float] = {"angle": 0.3, "length": 0.1, "share": 0.5}
 joints of an FR3 do, at which a person steps back in time."""
 _WAY = "the way from where the arm stands to the plan's first frame"
 _PLAN = "the plan from where the arm stands"
-_ASKED = "where it stood when a person was asked"
 _APPROACH_DT, _SHORTEST = 0.02, 0.5
 """Between frames of an approach, and its shortest duration, in [s]."""
 _START_TOLERANCE: Mapping[Kind, float] = {"angle": 0.002, "length": 0.0005, "share": 0.005}
@@ -85,8 +84,8 @@ class Request(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     limits: RobotLimits | None = None
     """Of the workspace's robot; the way to the plan's first frame is held against them too."""
     stood: dict[str, float] = {}
-    """Where each of the plan's columns stood when a person was asked: an approach begins there, or
-    it is not the one that was said yes to. Empty where nobody looked."""
+    """Where each of the arm's channels stood when a person was asked (`Look.pose`); empty where
+    nobody looked."""
 
 
 class Look(msgspec.Struct, frozen=True):
@@ -94,7 +93,7 @@ class Look(msgspec.Struct, frozen=True):
 
     arm: ArmDescription
     pose: dict[str, float]
-    """Where each of the plan's columns stands."""
+    """Where each of its channels stands."""
     there: bool
     """Whether that is near enough to the plan's first frame."""
     said: str
@@ -258,14 +257,13 @@ class _Prepared:
             )
         self.arm, self._pose, self.channels = arm, pose, arms_columns(plan.format, arm)
         """The arm, where it stands, and its channel of each of the plan's columns."""
-        form = with_turns(plan.format, request.limits)
+        self._turns = form = with_turns(plan.format, request.limits)
         plan = Plan(form.toward(plan.actions, pose[self.channels]), form)
         frames = np.tile(pose, (plan.horizon, 1))
         frames[:, self.channels] = plan.actions
         own = PlanFormat(arm.columns, arm.units, plan.format.dt / request.speed)
         self.plan = Plan(frames, own)
         """Channels that the plan leaves out are held where they stand."""
-        self._here = dict(zip(plan.format.names, pose[self.channels].tolist(), strict=True))
         off = np.abs(pose[self.channels] - plan.actions[0])
         self._said, self._there = say_distance(off, plan.format, request.gate)
 
@@ -303,17 +301,35 @@ class _Prepared:
 
     def motions(self) -> dict[str, Plan]:
         """What is to be executed, one after the other, by name; limits hold for all of it."""
+        self._require_unmoved()
         if self._request.motion == "approach":
-            stood = {**self._here, **self._request.stood}
-            off = np.abs([stood[name] - here for name, here in self._here.items()])
-            said, same = say_distance(off, self._form, self._request.gate, _ASKED)
-            if not same:
-                raise ConfigurationError(f"{said}: ask again")
             return {_WAY: self.to_start}
         if not self._there:
             raise ConfigurationError(f"{self._said}; move it there, or ask again with --approach")
         whole = {_PLAN: self.from_here}
         return whole if self.near else {_WAY: self.to_start, **whole}
+
+    def _require_unmoved(self) -> None:
+        """Refuse a motion if the arm was moved since a person was asked about it.
+
+        An approach begins where it stood; a plan begins at its own first frame, and holds the
+        channels that it leaves out. ConfigurationError says what is elsewhere.
+        """
+        stood, form = self._request.stood, self.plan.format
+        if not stood:
+            return
+        if stood.keys() != {*form.names}:
+            raise ConfigurationError("a person was asked about another arm: ask again")
+        was, gate = np.array([stood[name] for name in form.names]), self._request.gate
+        here = self._pose[self.channels]
+        was[self.channels] = self._turns.toward(was[None, self.channels], here)[0]
+        off = np.abs(was - self._pose)
+        if self._request.motion != "approach":
+            off[self.channels] = 0.0
+        off[[gate.errors_of(unit) is None for unit in form.units]] = 0.0
+        said, same = say_distance(off, form, gate, "where it stood when a person was asked")
+        if not same:
+            raise ConfigurationError(f"{said}: ask again")
 
     def look(self) -> Look:
         """How the arm stands to the plan."""
@@ -327,7 +343,7 @@ class _Prepared:
 
         return Look(
             arm=self.arm,
-            pose=self._here,
+            pose=dict(zip(self.arm.columns, self._pose.tolist(), strict=True)),
             there=self._there,
             said=self._said,
             approach=float(self.to_start.times[-1]),
@@ -346,6 +362,8 @@ def _keep(path: MeasuredPath, prepared: _Prepared, folder: Path) -> str:
         t, q = np.asarray(path.t, dtype=np.float64), np.asarray(path.q, dtype=np.float64)
     except (TypeError, ValueError) as error:
         return f"what {arm} measured is not kept, since it holds no numbers ({error})"
+    if t.size == q.size == 0:
+        return ""  # nothing was measured
     if t.ndim != 1 or q.shape != (len(t), d):
         return (
             f"what {arm} measured is not kept: t must be (T,) and q (T, {d}), got {t.shape} and "
@@ -353,8 +371,19 @@ def _keep(path: MeasuredPath, prepared: _Prepared, folder: Path) -> str:
         )
     if not (np.isfinite(t).all() and np.isfinite(q).all()):
         return f"what {arm} measured is not kept, since not all of it is finite"
-    if len(t):
+    try:
         np.savez(folder / PATH_FILE, t=t, q=q[:, prepared.channels])
+    except OSError as error:
+        return f"what {arm} measured is not kept: {error}"
+    return ""
+
+
+def _close(executor: Executor) -> str:
+    """Let go of the arm, which has moved whatever comes of this; why that failed, if it did."""
+    try:
+        executor.close()
+    except Exception as error:
+        return f"it was not let go: {error!r}"
     return ""
 
 
@@ -393,13 +422,13 @@ def drive(request: Request, plan: Plan, folder: Path) -> DriverResult:
             if motion is [*motions.values()][-1]:
                 unlike = _keep(path, prepared, folder)
         finally:
-            executor.close()
+            unclosed = _close(executor)
     except Exception as error:
         why = str(error) if isinstance(error, PriorReinforceError) else repr(error)
         result = DriverResult("aborted" if moved else "not_moved", why)
     else:
         outcome: Any = "done" if not path.fault else "aborted" if moved else "not_moved"
-        result = DriverResult(outcome, "; ".join(filter(None, [path.fault, unlike])))
+        result = DriverResult(outcome, "; ".join(filter(None, [path.fault, unlike, unclosed])))
     (folder / RESULT_FILE).write_bytes(msgspec.json.encode(result))
     return result
 

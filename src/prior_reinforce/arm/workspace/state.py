@@ -14,7 +14,6 @@ from typing import Literal
 from msgspec import structs
 
 from prior_reinforce.adapters import DEFAULT_ADAPTER
-from prior_reinforce.arm.executing.base import Motion
 from prior_reinforce.arm.executing.lock import is_executing
 from prior_reinforce.arm.workspace.events import (
     DemonstrationsImported,
@@ -55,8 +54,8 @@ class WorkspaceState(SessionState):
         """The latest event of each trial that a command executed, by its number."""
         self.moves: dict[int, Moving | Moved] = {}
         """The latest event of each trial that the arm moved for, executed or not."""
-        self.cut_off: dict[int, Motion] = {}
-        """Which motion before each trial was not made to its end, as far as anybody knows."""
+        self.cut_off: dict[int, Moving] = {}
+        """The motion before each trial that was not made to its end, as far as anybody knows."""
 
     @property
     def demonstrations(self) -> DemonstrationsImported | None:
@@ -126,7 +125,7 @@ class WorkspaceState(SessionState):
             self.executions[number] = event
         self.moves[number] = event
         if isinstance(event, Moving) and event.motion != "trial":
-            self.cut_off[number] = event.motion
+            self.cut_off[number] = event
         elif isinstance(event, Moving) or (event.motion != "trial" and event.outcome == "done"):
             self.cut_off.pop(number, None)
 

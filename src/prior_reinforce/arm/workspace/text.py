@@ -34,10 +34,8 @@ def say_trial(now: Standing, trial: Trial) -> str:
 
 def _say_trial(now: Standing, trial: Trial) -> str:
     if trial.reading is not None:
-        seen = say_reading(trial.reading, now.manifest.outcome_format)
-        seen = f"reached ({seen})" if trial.hit else seen
-        said = f"{seen}, {trial.surprise}" if trial.surprise else seen
-        return "; executed, ".join(filter(None, [said, execution_warning(now, trial)]))
+        warning = execution_warning(now, trial)
+        return say_told(now, trial) + (f"; executed, {warning}" if warning else "")
     match now.state.stage(trial):
         case "voided":
             return f"void: {trial.note}" if trial.note else "void"
@@ -57,9 +55,17 @@ def _say_trial(now: Standing, trial: Trial) -> str:
     waits = "asked for, waits to be executed and told"
     if cut_off := now.state.cut_off.get(trial.number):
         if now.moving:
-            return f"the arm makes its {cut_off} now"
-        waits = f"its {cut_off} was not made to its end; it waits to be executed and told"
+            return f"the arm makes its {cut_off.motion} now"
+        waits = f"its {cut_off.motion} was not made to its end; it waits to be executed and told"
     return f"{waits}; {_OUTDATED}" if trial.outdated else waits
+
+
+def say_told(now: Standing, trial: Trial) -> str:
+    """Say what was told of a trial."""
+    assert trial.reading is not None
+    seen = say_reading(trial.reading, now.manifest.outcome_format)
+    seen = f"reached ({seen})" if trial.hit else seen
+    return plain(f"{seen}, {trial.surprise}" if trial.surprise else seen)
 
 
 def say_expectation(now: Standing, trial: Trial) -> list[str]:
@@ -130,7 +136,7 @@ def execution_warning(now: Standing, trial: Trial) -> str:
     if ended.outcome == "aborted":
         warnings.append(f"aborted: {ended.reason or 'no reason was given'}")
     elif ended.reason:
-        warnings.append(ended.reason)
+        warnings.append(f"its driver says: {ended.reason}")
     for which, distances, says in (
         (0, ended.start_error, "began {} from the plan's first frame, more than {:g}"),
         (1, ended.tracking_rms, "went {} rms off the plan, more than {:g}"),
@@ -212,9 +218,11 @@ def execute_step(now: Standing, trial: Trial) -> str:
     if arm is None:
         return call(now.folder, "ask", '--run "COMMAND {plan}"')
     flags = ["--execute"]
-    if cut_off := now.state.cut_off.get(trial.number):
-        flags.append("--approach")
-        flags += ["--rehearse 0.2"] if cut_off == "rehearsal" else []
+    cut_off, last = now.state.cut_off.get(trial.number), now.state.moves.get(trial.number)
+    if cut_off or (isinstance(last, Moved) and last.motion == "rehearsal"):
+        flags.append("--approach")  # the arm may stand anywhere, or at the plan's end
+    if cut_off and cut_off.motion == "rehearsal":
+        flags.append(f"--rehearse {cut_off.speed:g}")
     return call(now.folder, "ask", *flags)
 
 
@@ -235,7 +243,7 @@ def check_open(now: Standing, trial: Trial, verb: Literal["ask", "tell"]) -> Non
     if verb == "tell" and stage == "asked" and (number in cut_off or now.manifest.driven_by):
         why = "the manifest's [arm] has not moved for it"
         if number in cut_off:
-            why = f"its {cut_off[number]} was not made to its end"
+            why = f"its {cut_off[number].motion} was not made to its end"
         raise TrialStateError(
             f"trial {number} was not executed, {why}: run {execute_step(now, trial)}, or void "
             "it; drop [arm] from the manifest if something else drives the arm"
