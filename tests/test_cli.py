@@ -123,7 +123,7 @@ def test_an_interruption_after_the_commit_says_so(run, folder, monkeypatch):
     def interrupted(*args):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("prior_reinforce.commands.telling.say_trial", interrupted)
+    monkeypatch.setattr("prior_reinforce.commands.telling.say_told", interrupted)
     status, _, err = run("tell", folder, 1, "--hit")
     assert status == 130
     assert err == "prior-reinforce: interrupted; what was recorded before stays\n"

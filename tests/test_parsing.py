@@ -670,8 +670,8 @@ def test_centimetres_that_can_be_nothing_else_are_read(text, place):
     ("text", "shown"),
     [
         ("92cm ahead, 0.1 left", [[0.9, 0.0]]),  # straight ahead
-        ("0.8 -20cm", 0.0),  # where nothing was shown
-        ("1.0 ahead, 0.2 right", 0.0),
+        ("0.8 -2.5cm", [1.0, 1.0]),
+        ("1.0 ahead, 0.2 right", [1.0, 1.0]),
     ],
 )
 def test_a_decimal_number_is_asked_about_whatever_was_shown_of_its_component(text, shown):

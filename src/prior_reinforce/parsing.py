@@ -282,15 +282,14 @@ def _with_clear_units(
     """Return a place, unless its numbers without a unit may be in the outcome's own, larger unit.
 
     `bare` holds the unit in which each was read. They may be, if none then is more than twice what
-    was `shown` of it, or, with a decimal point, of any component in that unit (if any was).
+    was `shown` of it, or, with a decimal point, of any component in that unit.
     """
     largest = np.broadcast_to(np.max(np.abs(np.atleast_2d(shown)), axis=0), place.shape)
     pointed, doubt = re.search(r"\d*\.\d", text), ""
     for j, unit in bare.items():
         own, scale = form.units[j], factor(unit, form.units[j]) or 1.0
         number, alike = place[j] / scale, largest[[other == own for other in form.units]].max()
-        limit = 2.0 * (alike if pointed else largest[j])
-        if abs(number) > limit and (alike or not pointed or looks_like(own, number)):
+        if abs(number) > 2.0 * (alike if pointed else largest[j]):
             return place
         if number and scale < 1.0 and not doubt:
             doubt = f"{number:g} has no unit; say {number:g}{unit} or {number:g}{own}"

@@ -28,8 +28,11 @@ from prior_reinforce.errors import InvalidDemonstrationsError, PriorReinforceErr
 from prior_reinforce.formats import OutcomeFormat
 from prior_reinforce.parsing import read_uncertain_place
 from prior_reinforce.terminal import plain
+from prior_reinforce.units import factor
 from prior_reinforce.wording import in_words, say_length, say_place
 
+_REACH = 1.0
+"""How far from the base objects land, in [m], where nobody has shown it. Ours: an arm's reach."""
 _SKIP, _BACK = ("skip", "s"), ("back", "b")
 
 
@@ -86,12 +89,13 @@ def ask_place(ask: Callable[[], str], form: OutcomeFormat, *words: str) -> Place
 
     EOFError if `ask` gets no answer.
     """
+    near = [_REACH * (factor("m", unit) or 0.0) for unit in form.units]
 
     def read(text: str) -> Place | str:
         said = text.strip()
         if said.lower() in words:
             return said.lower()
-        place, sd = read_uncertain_place(said, form)
+        place, sd = read_uncertain_place(said, form, near)
         return (*place.tolist(), sd)
 
     return until_read(ask, read)
