@@ -116,6 +116,16 @@ def test_a_disk_that_refuses_leaves_nothing(tmp_path, monkeypatch, code, remedy)
     assert not list(tmp_path.iterdir())
 
 
+def test_a_folder_that_cannot_be_written_to_is_named_and_no_file_of_ours(tmp_path, monkeypatch):
+    def refuse(dir, prefix):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(dir / prefix))
+
+    monkeypatch.setattr(files.tempfile, "mkdtemp", refuse)
+    with pytest.raises(WorkspaceError, match="make the folder writable") as refused:
+        write(tmp_path / "plan", b"one")
+    assert files._PREFIX not in str(refused.value)
+
+
 def test_a_disk_without_links(tmp_path, monkeypatch):
     def refuse(source, target):
         raise PermissionError(errno.EPERM, "Operation not permitted")

@@ -259,9 +259,13 @@ def sweep(folder: Path) -> None:
 
 @contextmanager
 def _unfinished(path: Path) -> Iterator[Path]:
-    """A place of the same name in a folder beside it, which is gone afterwards."""
+    """A place of the same name in a folder beside it, which is gone afterwards.
+
+    WorkspaceError if none can be made there.
+    """
     owner = f"{_PREFIX}{socket.gethostname()}-{os.getpid()}-"
-    around = Path(tempfile.mkdtemp(dir=path.parent, prefix=owner))
+    with named_disk_errors(path.parent):
+        around = Path(tempfile.mkdtemp(dir=path.parent, prefix=owner))
     try:
         yield around / path.name
     finally:

@@ -32,6 +32,7 @@ from prior_reinforce.commands.questions import agrees
 from prior_reinforce.errors import (
     ConfigurationError,
     InvalidDemonstrationsError,
+    WorkspaceError,
 )
 from prior_reinforce.files import named_disk_errors
 from prior_reinforce.plans.plan_format import PlanFormat
@@ -241,7 +242,7 @@ class _Session:
         said = f"picture: {picture}"
         try:
             _draw(take, form, self.channels, kind, picture)
-        except OSError as error:  # the take is kept without it
+        except (OSError, WorkspaceError) as error:  # the take is kept without it
             said = f"no picture: {error}"
         print(f"{take.name}: {take.t[-1]:.2f} s, its {kind} motion; {said}", flush=True)
         if led:
