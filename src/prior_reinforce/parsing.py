@@ -281,15 +281,16 @@ def _with_clear_units(
 ) -> Point:
     """Return a place, unless its numbers without a unit may be in the outcome's own, larger unit.
 
-    `bare` holds the unit in which each was read. They may be, if none then is more than twice what
-    was `shown` of it, or, with a decimal point, of any component in that unit.
+    `bare` has the unit in which each of these was read. In the outcome's own they may be if none is
+    more than twice as large as the largest `shown`: of that component, or, where the text has a
+    decimal point, of all components in that unit. InvalidFeedbackError names both units.
     """
     largest = np.broadcast_to(np.max(np.abs(np.atleast_2d(shown)), axis=0), place.shape)
-    pointed, doubt = re.search(r"\d*\.\d", text), ""
+    has_point, doubt = re.search(r"\.\d", text), ""
     for j, unit in bare.items():
         own, scale = form.units[j], factor(unit, form.units[j]) or 1.0
-        number, alike = place[j] / scale, largest[[other == own for other in form.units]].max()
-        if abs(number) > 2.0 * (alike if pointed else largest[j]):
+        number, of_unit = place[j] / scale, largest[[other == own for other in form.units]].max()
+        if abs(number) > 2.0 * (of_unit if has_point else largest[j]):
             return place
         if number and scale < 1.0 and not doubt:
             doubt = f"{number:g} has no unit; say {number:g}{unit} or {number:g}{own}"

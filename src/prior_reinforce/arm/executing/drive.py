@@ -353,9 +353,9 @@ class _Prepared:
 
 
 def _keep(path: MeasuredPath, prepared: _Prepared, folder: Path) -> str:
-    """Write what was measured in the plan's columns; why not, where it is no path of this arm.
+    """Write the measured path in the plan's columns; return why that failed, or an empty text.
 
-    The motion was made, whatever its executor says of it.
+    A failure raises nothing: the motion was made, whatever its executor says of it.
     """
     d, arm = len(prepared.arm.columns), prepared.arm.model
     try:
@@ -379,7 +379,7 @@ def _keep(path: MeasuredPath, prepared: _Prepared, folder: Path) -> str:
 
 
 def _close(executor: Executor) -> str:
-    """Let go of the arm, which has moved whatever comes of this; why that failed, if it did."""
+    """Let go of the arm; return why that failed, or an empty text."""
     try:
         executor.close()
     except Exception as error:
@@ -418,17 +418,16 @@ def drive(request: Request, plan: Plan, folder: Path) -> DriverResult:
                 moved = moved_before or path.moved
                 if path.fault:
                     break
-            unlike = ""
-            if motion is [*motions.values()][-1]:
-                unlike = _keep(path, prepared, folder)
+            last = motion is [*motions.values()][-1]
+            not_kept = _keep(path, prepared, folder) if last else ""
         finally:
-            unclosed = _close(executor)
+            not_closed = _close(executor)
     except Exception as error:
         why = str(error) if isinstance(error, PriorReinforceError) else repr(error)
         result = DriverResult("aborted" if moved else "not_moved", why)
     else:
         outcome: Any = "done" if not path.fault else "aborted" if moved else "not_moved"
-        result = DriverResult(outcome, "; ".join(filter(None, [path.fault, unlike, unclosed])))
+        result = DriverResult(outcome, "; ".join(filter(None, [path.fault, not_kept, not_closed])))
     (folder / RESULT_FILE).write_bytes(msgspec.json.encode(result))
     return result
 

@@ -71,8 +71,9 @@ def execute(
     A motion that is no trial, which an arm alone makes, is noted likewise, and the plan may be
     executed afterwards. `time_limit` is of a command, of an arm it is beyond the plan's own
     duration, in [s]; `speed`, of a rehearsal, is a share of the plan's own. After a stop since
-    `stop_seen` (`last_stop` when it was asked for; now if not given), nothing begins. An approach
-    begins where the arm `stood` when a person was asked (`Look.pose`), or not at all.
+    `stop_seen` (`last_stop` when it was asked for; now if not given), nothing begins. `stood` is
+    where the arm was when a person was asked (`Look.pose`): nothing begins if a channel was moved
+    since, for a trial or a rehearsal one that the plan leaves out.
 
     TrialStateError if it was stopped since, executed already, is not open, or another program
     executes one; RobotLimitError if the plan breaks a limit of now; ConfigurationError if the
