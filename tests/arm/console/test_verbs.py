@@ -363,7 +363,7 @@ def test_an_arm_says_where_it_stands_and_a_person_is_asked_what_the_command_line
     assert (asked.motion, asked.refused, toy_arm.motions(arm)) == ("trial", "", 0)
     slow = verbs.question(execution(state, motion="rehearsal", speed=0.2))
     assert slow.question.startswith("Trial 1 will be rehearsed at 20 % of its speed (2.3 s). NOT")
-    verbs.execute(execution(state))
+    verbs.execute(execution(state, stood=slow.stood))
     wait_for(lambda: verbs.state().step == "tell")
     assert toy_arm.motions(arm) == 1
 
@@ -400,7 +400,9 @@ def test_a_plan_that_the_arm_refuses_and_a_fault_are_said(on_arm):
     assert "more than 0.1000" in verbs.question(execution(state)).refused
     verbs.close()
     verbs, _ = on_arm(kind="faults")
-    verbs.execute(execution(verbs.state()))
+    state = verbs.state()
+    asked = verbs.question(execution(state))
+    verbs.execute(execution(state, stood=asked.stood))
     wait_for(lambda: verbs.state().step == "settle")
     assert verbs.state().trials[0].warning == f"but aborted: {toy_arm.FAULT}"
 

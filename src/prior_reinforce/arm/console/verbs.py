@@ -246,7 +246,7 @@ class Verbs:
             stage = self.workspace.state.stage(trial)
             if stage != "asked" or self._is_running():
                 raise TrialStateError(f"trial {trial.number} is {stage} already")
-            if body.motion == "approach" and not body.stood:
+            if isinstance(by, ArmSettings) and not body.stood:
                 raise TrialStateError("nobody was asked where the arm stands; prepare it again")
             stop_seen, began = last_stop(self.folder), len(self.workspace.events)
             if body.stopped != str(stop_seen):
